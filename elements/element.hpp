@@ -1,0 +1,92 @@
+// The contract of an element type: what a reference cell must state so that everything else follows.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+namespace halfgrad {
+
+/// A facet of a reference cell: the local nodes of one side (two for a triangle's edge, four for a hexahedron's face),
+/// in cyclic order.
+struct Facet {
+  int num_nodes;
+  std::array<int, 4> nodes;
+};
+
+/// ξ of E, dim × 1.
+template <class E>
+using ReferencePoint = Eigen::Matrix<double, E::dim, 1>;
+/// One value a node, num_nodes × 1.
+template <class E>
+using NodeVector = Eigen::Matrix<double, E::num_nodes, 1>;
+/// One row a node, num_nodes × dim.
+template <class E>
+using NodeMatrix = Eigen::Matrix<double, E::num_nodes, E::dim>;
+
+/// An element type: static facts of a reference cell, and nothing about meshes, points or gradients.
+///
+/// member               meaning
+/// name                 the name used in JSON and reports, singular ("tetrahedron")
+/// vtk_id               the VTK cell type; node order is VTK's
+/// dim                  dimension of the reference cell
+/// num_nodes            number of nodes, which are the cell's corners
+/// affine               true where x(ξ) is affine for any node positions (simplices)
+/// reference_volume     volume of the reference cell
+/// facets               std::array<Facet, n>: the sides, by local node
+/// nodes()              num_nodes × dim, reference coordinates of the nodes
+/// center()             ξ at which the cell's own gradient is taken
+/// shape(ξ)             num_nodes × 1 with Σβ = 1 and Σβ_i node_i = ξ
+/// shape_gradient(ξ)    num_nodes × dim, row i = ∂β_i/∂ξ
+/// margin(ξ)            least reference distance to a facet: ≥ 0 inside, negative outside
+template <class E>
+concept Element = requires(const ReferencePoint<E>& xi) {
+  { E::name } -> std::convertible_to<std::string_view>;
+  { E::vtk_id } -> std::convertible_to<int>;
+  { E::dim } -> std::convertible_to<int>;
+  { E::num_nodes } -> std::convertible_to<int>;
+  { E::affine } -> std::convertible_to<bool>;
+  { E::reference_volume } -> std::convertible_to<double>;
+  { E::facets.size() } -> std::convertible_to<std::size_t>;
+  { E::facets[0] } -> std::convertible_to<const Facet&>;
+  { E::nodes() } -> std::convertible_to<NodeMatrix<E>>;
+  { E::center() } -> std::convertible_to<ReferencePoint<E>>;
+  { E::shape(xi) } -> std::convertible_to<NodeVector<E>>;
+  { E::shape_gradient(xi) } -> std::convertible_to<NodeMatrix<E>>;
+  { E::margin(xi) } -> std::convertible_to<double>;
+};
+
+/// Whether ξ lies in the reference cell grown by `eps` (in reference lengths).
+template <Element E>
+bool contains(const ReferencePoint<E>& xi, double eps) {
+  return E::margin(xi) >= -eps;
+}
+
+/// An ordered list of element types.
+template <Element... Es>
+struct ElementList {
+  static constexpr std::size_t size = sizeof...(Es);
+
+  /// Calls visit.operator()<E>() for each element in order.
+  template <class Visitor>
+  static constexpr void for_each(Visitor&& visit) {
+    (visit.template operator()<Es>(), ...);
+  }
+
+  /// Greatest number of nodes and greatest dimension in the list.
+  static constexpr int max_nodes = std::max({Es::num_nodes...});
+  static constexpr int max_dim = std::max({Es::dim...});
+
+  /// The template instantiated with all elements, e.g. a std::variant of blocks.
+  template <template <class...> class List, template <class> class Item>
+  using apply = List<Item<Es>...>;
+};
+
+}  // namespace halfgrad

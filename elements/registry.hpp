@@ -1,0 +1,17 @@
+// The one list of element types: readers, JSON names, meshes, kernels and tests derive from it.
+#pragma once
+
+#include "elements/hexahedron.hpp"
+#include "elements/quadrilateral.hpp"
+#include "elements/tetrahedron.hpp"
+#include "elements/triangle.hpp"
+
+namespace halfgrad {
+
+using Elements = ElementList<  //
+    Triangle,                  //
+    Quadrilateral,             //
+    Tetrahedron,               //
+    Hexahedron>;
+
+}  // namespace halfgrad

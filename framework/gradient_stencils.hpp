@@ -1,0 +1,72 @@
+// Vertex gradients as weights on vertex values: what every reconstructor ends in.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "framework/types.hpp"
+
+namespace halfgrad {
+
+/// How a vertex's stencil came to be.
+enum class StencilRule : std::uint8_t {
+  average,      ///< a weighted mean of the adjacent cells' gradients
+  full_fit,     ///< the first patch of the schedule determined every mode
+  wider_patch,  ///< a later patch of the schedule did
+  damped,       ///< no patch determined every mode; weak modes are damped
+  cell_value,   ///< fallback to the volume-weighted mean of the adjacent cells' gradients
+  none          ///< the vertex belongs to no usable cell: gradient zero
+};
+
+/// What a reconstructor tells of one row.
+struct StencilDiagnostics {
+  StencilRule rule = StencilRule::average;
+  std::uint8_t schedule_entry = 0;    ///< which patch of the schedule served
+  Index num_points = 0;               ///< vertices (or cells, for averages) in the patch
+  float smallest_singular_value = 0;  ///< of the constrained system, dimensionless
+  float absolute_sum = 0;             ///< A1 = Σ_j |g_vj| · h_v
+  float expected_error = 0;           ///< J of the kriging, dimensionless
+};
+
+/// Compressed rows of difference stencils, F_v = Σ_j (x_j − x_v) ⊗ g_vj: rows sum to zero by construction, so a
+/// translation of the values changes nothing, not even round-off relative to the offset.
+struct GradientStencilTable {
+  int gdim = 0;
+  std::vector<Index> vertices;          ///< row r belongs to vertex vertices[r]
+  std::vector<Offset> offsets{0};       ///< #rows + 1
+  std::vector<Index> neighbors;         ///< vertex j of each entry, never the row's own vertex
+  std::vector<double> weights;          ///< gdim an entry: g_vj, in 1/length
+  std::vector<double> hessian_weights;  ///< empty, or num_symmetric(gdim) an entry: Q_v = Σ_j (x_j − x_v) ⊗ q_vj
+  std::vector<StencilDiagnostics> diagnostics;  ///< empty, or one a row
+
+  Index num_rows() const { return static_cast<Index>(vertices.size()); }
+  Offset num_entries() const { return static_cast<Offset>(neighbors.size()); }
+  bool has_hessians() const { return !hessian_weights.empty(); }
+};
+
+/// A second table and the rule that blends it in, a vertex and a frame at a time (reconstructor `adaptive`).
+/// Roughness of a gradient field at v: ρ(F)_v = Σ over edges e = X_j − X_v of |(F_v + F_j) e − 2 (x_j − x_v)|² / |e|².
+struct AdaptiveBlend {
+  GradientStencilTable averaging;       ///< same rows in the same order as the main table
+  Index num_blended = 0;                ///< the first rows need a blended result; the rest serve the roughness only
+  std::vector<Offset> edge_offsets{0};  ///< #num_blended + 1
+  std::vector<Index> edge_rows;         ///< row of the edge's other vertex
+  std::vector<double> edges;            ///< gdim an edge: X_j − X_v
+};
+
+/// What a reconstructor gives: one linear table, or two with a data-dependent blend.
+struct Reconstruction {
+  GradientStencilTable stencils;
+  std::optional<AdaptiveBlend> blend;
+};
+
+/// Applies a table: row r of the result is F_v (and Q_v), (row = component, column = axis) flattened row-major,
+/// #rows × (#columns · gdim). Values are #vertices × #columns.
+template <class Scalar>
+Values<Scalar> apply_stencils(const GradientStencilTable& table, const Values<Scalar>& values);
+
+/// Applies the Hessian weights: #rows × (#columns · num_symmetric(gdim)). Throws Error where the table has none.
+template <class Scalar>
+Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const Values<Scalar>& values);
+
+}  // namespace halfgrad

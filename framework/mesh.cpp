@@ -1,0 +1,217 @@
+#include "framework/mesh.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "framework/error.hpp"
+
+namespace halfgrad {
+
+namespace {
+
+// A facet by its vertices in ascending order; the orientation plays no part in counting owners.
+struct FacetKey {
+  std::array<Index, 4> vertices;
+  auto operator<=>(const FacetKey&) const = default;
+};
+
+template <Element E>
+FacetKey facet_key(const ElementBlock<E>& block, Eigen::Index row, const Facet& facet) {
+  FacetKey key;
+  key.vertices.fill(std::numeric_limits<Index>::max());
+  for (int i = 0; i < facet.num_nodes; ++i) key.vertices[i] = block.cells(row, facet.nodes[i]);
+  std::sort(key.vertices.begin(), key.vertices.end());
+  return key;
+}
+
+std::vector<FacetKey> sorted_facets(const Mesh& mesh) {
+  std::vector<FacetKey> facets;
+  for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
+    for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
+      for (const Facet& facet : E::facets) facets.push_back(facet_key(block, c, facet));
+  });
+  std::sort(facets.begin(), facets.end());
+  return facets;
+}
+
+// Calls f(key, count) for each distinct facet.
+template <class Function>
+void for_each_facet(const std::vector<FacetKey>& sorted, Function&& f) {
+  for (std::size_t i = 0; i < sorted.size();) {
+    std::size_t j = i;
+    while (j < sorted.size() && sorted[j] == sorted[i]) ++j;
+    f(sorted[i], j - i);
+    i = j;
+  }
+}
+
+// The edges of an element, read off its facets: consecutive nodes of a facet with two nodes or more.
+template <Element E>
+std::vector<std::pair<int, int>> local_edges() {
+  std::vector<std::pair<int, int>> edges;
+  for (const Facet& facet : E::facets)
+    for (int i = 0; i < facet.num_nodes; ++i) {
+      const int a = facet.nodes[i], b = facet.nodes[(i + 1) % facet.num_nodes];
+      if (a != b) edges.emplace_back(std::min(a, b), std::max(a, b));
+    }
+  if constexpr (E::dim == 1) edges.emplace_back(0, 1);
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
+}  // namespace
+
+Mesh::Mesh(Points vertices, std::vector<AnyBlock> blocks) : vertices_(std::move(vertices)), blocks_(std::move(blocks)) {
+  if (vertices_.rows() > std::numeric_limits<Index>::max())
+    raise("a mesh of {} vertices: at most {} can be numbered", vertices_.rows(), std::numeric_limits<Index>::max());
+  if (vertices_.cols() < 1 || vertices_.cols() > max_gdim)
+    raise("vertices with {} coordinates: expected 1 to {}", vertices_.cols(), max_gdim);
+  for (Eigen::Index v = 0; v < vertices_.rows(); ++v)
+    if (!vertices_.row(v).allFinite()) raise("vertex {} has a coordinate that is not finite", v);
+  first_cell_.push_back(0);
+  for (const AnyBlock& any : blocks_)
+    std::visit(
+        [&]<Element E>(const ElementBlock<E>& block) {
+          if (E::dim != vertices_.cols())
+            raise("{} cells need vertices with {} coordinates, found {}", E::name, E::dim, vertices_.cols());
+          if (block.cells.rows() > std::numeric_limits<Index>::max() - first_cell_.back())
+            raise("more than {} cells", std::numeric_limits<Index>::max());
+          for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
+            const auto cell = block.cells.row(c);
+            for (int i = 0; i < E::num_nodes; ++i) {
+              if (cell[i] < 0 || cell[i] >= vertices_.rows())
+                raise("cell {} ({}) names vertex {}: expected 0 to {}", first_cell_.back() + c, E::name, cell[i],
+                      vertices_.rows() - 1);
+              for (int j = 0; j < i; ++j)
+                if (cell[i] == cell[j])
+                  raise("cell {} ({}) names vertex {} twice", first_cell_.back() + c, E::name, cell[i]);
+            }
+          }
+          first_cell_.push_back(first_cell_.back() + static_cast<Index>(block.cells.rows()));
+        },
+        any);
+}
+
+std::size_t Mesh::block_of(Index cell) const {
+  return static_cast<std::size_t>(std::upper_bound(first_cell_.begin(), first_cell_.end(), cell) - first_cell_.begin() -
+                                  1);
+}
+
+std::span<const Index> Mesh::cell_vertices(Index cell) const {
+  const std::size_t b = block_of(cell);
+  return std::visit(
+      [&]<Element E>(const ElementBlock<E>& block) {
+        return std::span<const Index>(
+            block.cells.data() + static_cast<Eigen::Index>(cell - first_cell_[b]) * E::num_nodes, E::num_nodes);
+      },
+      blocks_[b]);
+}
+
+std::string_view element_name(const Mesh& mesh, Index cell) {
+  return with_cell(mesh, cell,
+                   []<Element E>(const ElementBlock<E>&, Eigen::Index) { return std::string_view(E::name); });
+}
+
+IndexTable vertex_cells(const Mesh& mesh) {
+  IndexTable table;
+  table.offsets.assign(static_cast<std::size_t>(mesh.num_vertices()) + 1, 0);
+  const auto each_corner = [&](auto&& f) {
+    for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
+      for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
+        for (int i = 0; i < E::num_nodes; ++i) f(block.cells(c, i), static_cast<Index>(first + c));
+    });
+  };
+  each_corner([&](Index v, Index) { ++table.offsets[v + 1]; });
+  std::partial_sum(table.offsets.begin(), table.offsets.end(), table.offsets.begin());
+  table.entries.resize(table.offsets.back());
+  std::vector<Offset> next(table.offsets.begin(), table.offsets.end() - 1);
+  each_corner([&](Index v, Index c) { table.entries[next[v]++] = c; });
+  return table;
+}
+
+std::vector<char> boundary_vertices(const Mesh& mesh) {
+  std::vector<char> boundary(mesh.num_vertices(), 0);
+  for_each_facet(sorted_facets(mesh), [&](const FacetKey& key, std::size_t count) {
+    if (count == 2) return;
+    for (Index v : key.vertices)
+      if (v != std::numeric_limits<Index>::max()) boundary[v] = 1;
+  });
+  return boundary;
+}
+
+MeshReport inspect(const Mesh& mesh) {
+  MeshReport report;
+  report.min_edge = report.min_quality = std::numeric_limits<double>::infinity();
+  double edge_sum = 0, quality_sum = 0;
+  Offset num_edges = 0;
+  std::vector<char> used(mesh.num_vertices(), 0);
+  for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
+    static const auto edges = local_edges<E>();
+    const auto reference = E::nodes();
+    for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
+      const auto positions = node_positions(mesh, block, c);
+      for (int i = 0; i < E::num_nodes; ++i) used[block.cells(c, i)] = 1;
+      double longest = 0;
+      for (const auto& [a, b] : edges) {
+        const double length = (positions.row(a) - positions.row(b)).norm();
+        longest = std::max(longest, length);
+        report.min_edge = std::min(report.min_edge, length);
+        edge_sum += length;
+        ++num_edges;
+      }
+      report.max_edge = std::max(report.max_edge, longest);
+      double lowest = std::numeric_limits<double>::infinity(), highest = -lowest, quality = 1;
+      for (int i = 0; i < E::num_nodes; ++i) {
+        const Eigen::Matrix<double, E::dim, E::dim> jacobian =
+            positions.transpose() * E::shape_gradient(reference.row(i).transpose());
+        const double determinant = jacobian.determinant();
+        lowest = std::min(lowest, determinant);
+        highest = std::max(highest, determinant);
+        const double edge_product = jacobian.colwise().norm().prod();
+        quality = std::min(quality, edge_product > 0 ? std::abs(determinant) / edge_product : 0);
+      }
+      const Index cell = static_cast<Index>(first + c);
+      const double smallest = std::min(std::abs(lowest), std::abs(highest));
+      if (!(smallest > 1e-14 * std::pow(longest, E::dim))) report.degenerate_cells.push_back(cell);
+      if (lowest < 0) report.inverted_cells.push_back(cell);
+      if (lowest < 0 && highest > 0) report.folded_cells.push_back(cell);
+      const Eigen::Matrix<double, E::dim, E::dim> jacobian = positions.transpose() * E::shape_gradient(E::center());
+      report.volume += std::abs(jacobian.determinant()) * E::reference_volume;
+      report.min_quality = std::min(report.min_quality, quality);
+      quality_sum += quality;
+    }
+  });
+  for_each_facet(sorted_facets(mesh), [&](const FacetKey&, std::size_t count) {
+    if (count == 1) ++report.num_boundary_facets;
+    if (count > 2) ++report.num_nonmanifold_facets;
+  });
+  for (Index v = 0; v < mesh.num_vertices(); ++v)
+    if (!used[v]) report.unused_vertices.push_back(v);
+  if (mesh.num_cells() == 0) {
+    report.min_edge = report.min_quality = 0;
+    return report;
+  }
+  report.mean_edge = edge_sum / static_cast<double>(num_edges);
+  report.mean_quality = quality_sum / mesh.num_cells();
+  return report;
+}
+
+double mean_edge_length(const Mesh& mesh) {
+  double sum = 0;
+  Offset count = 0;
+  for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
+    static const auto edges = local_edges<E>();
+    for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
+      const auto positions = node_positions(mesh, block, c);
+      for (const auto& [a, b] : edges) sum += (positions.row(a) - positions.row(b)).norm();
+      count += static_cast<Offset>(edges.size());
+    }
+  });
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
+}  // namespace halfgrad

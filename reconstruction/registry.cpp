@@ -1,0 +1,67 @@
+#include "reconstruction/registry.hpp"
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "framework/error.hpp"
+#include "reconstruction/cell_averages.hpp"
+
+namespace halfgrad {
+
+std::span<const ReconstructorEntry> reconstructor_registry() {
+  static const std::array entries = {
+      ReconstructorEntry{"unweighted_average", "mean of the adjacent cells' gradients",
+                         [](JsonReader&) -> std::unique_ptr<VertexGradientReconstructor> {
+                           return std::make_unique<UnweightedAverage>();
+                         }},
+      ReconstructorEntry{"volume_average", "mean of the adjacent cells' gradients, weighted by volume",
+                         [](JsonReader&) -> std::unique_ptr<VertexGradientReconstructor> {
+                           return std::make_unique<VolumeAverage>();
+                         }},
+      ReconstructorEntry{"chandrashekar_garg", "James 2020, Eq. 24-27: inverse-distance weights, Tikhonov epsilon",
+                         [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
+                           return std::make_unique<ChandrashekarGarg>(
+                               ChandrashekarGargOptions{.epsilon = options.number("epsilon", 1)});
+                         }},
+      ReconstructorEntry{"knn", "the same weights over the adjacent cells and the k cells whose centroids are nearest",
+                         [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
+                           KnnOptions knn;
+                           knn.k = static_cast<int>(options.integer("k", knn.k));
+                           knn.epsilon = options.number("epsilon", knn.epsilon);
+                           return std::make_unique<Knn>(knn);
+                         }},
+  };
+  return entries;
+}
+
+MadeReconstructor make_reconstructor(const nlohmann::json& specification, const std::string& pointer) {
+  std::string name;
+  nlohmann::json options = nlohmann::json::object();
+  std::string where = pointer;
+  if (specification.is_string()) {
+    name = specification.get<std::string>();
+  } else if (specification.is_object() && specification.size() == 1) {
+    name = specification.begin().key();
+    options = specification.begin().value();
+    where += "/" + name;
+  } else {
+    raise("{}: found {}, expected a reconstructor's name or {{\"name\": {{options}}}}",
+          pointer.empty() ? "reconstructor" : pointer, specification.dump());
+  }
+  std::vector<std::string_view> names;
+  for (const ReconstructorEntry& entry : reconstructor_registry()) {
+    if (entry.name == name) {
+      JsonReader reader(options, where);
+      MadeReconstructor made{name, "", entry.make(reader)};
+      reader.finish();
+      made.options = reader.resolved().dump();
+      return made;
+    }
+    names.push_back(entry.name);
+  }
+  const std::string nearest = nearest_name(name, names);
+  raise("{}: no reconstructor \"{}\"; known: {}{}", pointer.empty() ? "reconstructor" : pointer, name,
+        join_names(names), nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
+}
+
+}  // namespace halfgrad

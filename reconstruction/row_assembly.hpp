@@ -1,0 +1,33 @@
+// Rows of a stencil table computed in parallel, stored in order.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "framework/cell_gradients.hpp"
+#include "framework/gradient_stencils.hpp"
+
+namespace halfgrad {
+
+/// One row under construction.
+struct StencilRow {
+  std::vector<Index> neighbors;
+  std::vector<double> weights;          ///< gdim an entry
+  std::vector<double> hessian_weights;  ///< none, or num_symmetric(gdim) an entry
+  StencilDiagnostics diagnostics;
+
+  void clear();
+};
+
+/// Fills a table: make_row(vertex, row) is called once a vertex, from several threads, on a cleared row. The result
+/// does not depend on the number of threads.
+GradientStencilTable assemble_rows(int gdim, std::span<const Index> vertices,
+                                   const std::function<void(Index vertex, StencilRow& row)>& make_row);
+
+/// The row Σ_k w_k F_k of a vertex: cell gradients composed to vertex differences, the vertex itself left out (its
+/// weight is minus the sum of the others). Neighbours ascend.
+void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
+                 std::span<const double> cell_weights, StencilRow& row);
+
+}  // namespace halfgrad
