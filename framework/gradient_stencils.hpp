@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "framework/types.hpp"
@@ -68,5 +69,13 @@ Values<Scalar> apply_stencils(const GradientStencilTable& table, const Values<Sc
 /// Applies the Hessian weights: #rows × (#columns · num_symmetric(gdim)). Throws Error where the table has none.
 template <class Scalar>
 Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const Values<Scalar>& values);
+
+/// Gradients under a blend (reconstructor `adaptive`) for the first num_blended rows, #num_blended × (#columns · gdim).
+template <class Scalar>
+Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Values<Scalar>& values);
+
+/// The rows of `vertices`, in that order. A reconstruction with a blend must already start with them. Throws Error
+/// where a vertex has no row.
+Reconstruction select_rows(const Reconstruction& reconstruction, std::span<const Index> vertices);
 
 }  // namespace halfgrad

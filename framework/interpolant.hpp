@@ -4,40 +4,13 @@
 #include <Eigen/SparseCore>
 #include <memory>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "framework/embedding.hpp"
 #include "framework/gradient_stencils.hpp"
+#include "framework/interpolation_rule.hpp"
 
 namespace halfgrad {
-
-/// How vertex data become the value at a point. All but dual_taylor have the form f = Σ_i a_i x_i + F_i c_i.
-enum class Formula : std::uint8_t {
-  blend,  ///< Σ β_i (x_i + α F_i (X − X_i)): linear (α = 0), Phong (½), vertex blend (1); James 2020, Eq. 11–13, 19
-  hermite,      ///< cubic along edges from the same data
-  dual_taylor,  ///< Σ β_i (x_i + ⅔ F_i d_i + ⅙ d_iᵀ Q_i d_i): order four; Kraaijpoel & van Leeuwen 2010
-  quadratic10   ///< quadratic with Hermite midpoints, James 2020, Eq. 20–23: equals Phong; simplices only
-};
-
-/// An interpolant: a formula and its parameter.
-struct InterpolationRule {
-  Formula formula = Formula::blend;
-  double alpha = 0.5;  ///< of blend
-
-  bool needs_gradients() const { return formula != Formula::blend || alpha != 0; }
-  bool needs_hessians() const { return formula == Formula::dual_taylor; }
-};
-
-/// The named interpolants with their default parameter, in the order reports list them.
-struct NamedRule {
-  std::string_view name;
-  InterpolationRule rule;
-  std::string_view summary;
-};
-std::span<const NamedRule> named_rules();
-/// The rule of a name; throws Error that lists the known names.
-InterpolationRule named_rule(std::string_view name);
 
 /// What bind took in and left out.
 struct BindReport {
@@ -52,6 +25,12 @@ struct BindReport {
 struct EvaluateOptions {
   /// Length: cells whose quadratic correction is bounded by it are evaluated linearly. 0 evaluates every cell in full.
   double tolerance = 0;
+};
+
+/// Memory of the vertex stage, kept between frames. One a thread that evaluates.
+template <class Scalar>
+struct Workspace {
+  Values<Scalar> gradients, hessians;
 };
 
 /// The vertices of the cells that hold points, in the order in which an interpolant numbers them: by first use along
@@ -80,7 +59,9 @@ class Interpolant {
 
   /// Values at the points, #points × #columns, from vertex values, #vertices × #columns; NaN rows for points not found.
   Values<Scalar> evaluate(const Values<Scalar>& values, const EvaluateOptions& options = {}) const;
-  void evaluate(const Values<Scalar>& values, Values<Scalar>& out, const EvaluateOptions& options = {}) const;
+  /// The same into the caller's memory, which is resized where it does not fit: no allocation from the second frame on.
+  void evaluate(const Values<Scalar>& values, Values<Scalar>& out, Workspace<Scalar>& workspace,
+                const EvaluateOptions& options = {}) const;
 
   /// The vertex stage alone: F (and Q) of the active vertices in binding order, #active × (#columns · gdim), row =
   /// component, column = axis.
@@ -100,7 +81,7 @@ class Interpolant {
   /// The map as one sparse matrix, #points × #vertices: evaluate(x) == S·x. Throws Error for data-dependent gradients.
   Eigen::SparseMatrix<double, Eigen::RowMajor> matrix() const;
 
-  /// Cells that the last argument's tolerance lets evaluate linearly: the count a report shows.
+  /// Number of active cells that options.tolerance lets evaluate linearly.
   Index num_linear_cells(const Values<Scalar>& values, const EvaluateOptions& options) const;
 
  private:
