@@ -3,12 +3,14 @@
 
 #include "elements/hexahedron.hpp"
 #include "elements/quadrilateral.hpp"
+#include "elements/segment.hpp"
 #include "elements/tetrahedron.hpp"
 #include "elements/triangle.hpp"
 
 namespace halfgrad {
 
 using Elements = ElementList<  //
+    Segment,                   //
     Triangle,                  //
     Quadrilateral,             //
     Tetrahedron,               //
