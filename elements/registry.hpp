@@ -6,6 +6,7 @@
 #include "elements/segment.hpp"
 #include "elements/tetrahedron.hpp"
 #include "elements/triangle.hpp"
+#include "elements/wedge.hpp"
 
 namespace halfgrad {
 
@@ -14,6 +15,7 @@ using Elements = ElementList<  //
     Triangle,                  //
     Quadrilateral,             //
     Tetrahedron,               //
+    Wedge,                     //
     Hexahedron>;
 
 }  // namespace halfgrad
