@@ -2,6 +2,7 @@
 #pragma once
 
 #include "elements/hexahedron.hpp"
+#include "elements/pyramid.hpp"
 #include "elements/quadrilateral.hpp"
 #include "elements/segment.hpp"
 #include "elements/tetrahedron.hpp"
@@ -15,6 +16,7 @@ using Elements = ElementList<  //
     Triangle,                  //
     Quadrilateral,             //
     Tetrahedron,               //
+    Pyramid,                   //
     Wedge,                     //
     Hexahedron>;
 
