@@ -69,9 +69,14 @@ bool contains(const ReferencePoint<E>& xi, double eps) {
   return E::margin(xi) >= -eps;
 }
 
-/// An ordered list of element types.
-template <Element... Es>
+/// True for elements, ill-formed for other types. GCC explains an unmet concept of one type, but not of a pack.
+template <Element E>
+inline constexpr bool is_element = true;
+
+/// An ordered list of element types. A type that is no element is refused by a message that names what it lacks.
+template <class... Es>
 struct ElementList {
+  static_assert((is_element<Es> && ...));
   static constexpr std::size_t size = sizeof...(Es);
 
   /// Calls visit.operator()<E>() for each element in order.
