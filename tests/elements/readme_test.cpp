@@ -12,7 +12,7 @@
 namespace halfgrad {
 namespace {
 
-const std::string elements_directory = std::string(HALFGRAD_SOURCE_DIR) + "/elements/";
+const std::string elements_directory = std::string(PROJECT_SOURCE_DIR) + "/elements/";
 
 std::vector<std::string> lines_of(const std::string& name) {
   std::ifstream file(elements_directory + name);
