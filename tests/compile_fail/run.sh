@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
 # run.sh COMPILER ROOT FLAG...: an element that lacks a member of the concept Element must be refused by a message that
-# names the member. The complete element below compiles; each variant lacks one of its lines.
+# names the member. Segment, which has one member a line, compiles whole; each variant lacks one of its lines.
 set -euo pipefail
 compiler=$1
 root=$2
 shift 2
-source=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/segment.inc
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
@@ -13,11 +12,11 @@ compile() {
   LC_ALL=C "$compiler" -std=c++20 -fsyntax-only -I "$root" "$@" "$work/lists.cpp" >"$work/messages.txt" 2>&1
 }
 
-# variant NAMESPACE PATTERN: the element without the lines that match, in a list of its own.
+# variant NAMESPACE PATTERN: Segment without the lines that match, in a list of its own.
 variant() {
-  printf 'namespace %s {\n' "$1"
-  grep -vE "$2" "$source"
-  printf 'constexpr auto size = halfgrad::ElementList<Segment>::size;\n}\n'
+  printf 'namespace halfgrad::%s {\n' "$1"
+  sed -n '/^struct Segment/,/^};/p' "$root/elements/segment.hpp" | grep -vE "$2"
+  printf 'constexpr auto size = ElementList<Segment>::size;\n}\n'
 }
 
 {
@@ -25,7 +24,7 @@ variant() {
   variant complete '^$'
 } >"$work/lists.cpp"
 if ! compile "$@"; then
-  echo "the complete element does not compile:"
+  echo "Segment does not compile:"
   cat "$work/messages.txt"
   exit 1
 fi
@@ -43,8 +42,8 @@ fi
 for member in $members; do
   # GCC, GCC for what the signature needs, Clang.
   if ! grep -qE -e "the required expression 'E::$member\b.*is invalid" \
-    -e "'$member' is not a member of 'without_$member::" \
-    -e "no member named '$member' in 'without_$member::" "$work/messages.txt"; then
+    -e "'$member' is not a member of '(halfgrad::)?without_$member::" \
+    -e "no member named '$member' in '(halfgrad::)?without_$member::" "$work/messages.txt"; then
     echo "no message names the missing member $member:"
     cat "$work/messages.txt"
     exit 1
