@@ -100,7 +100,7 @@ struct Interpolant<Scalar>::Binding {
   //   first    [run]              position of the run's first point in `user` and `local`
   //   local    [point][axis]      ξ
   //   offset   [point]            row of `offsets` for points outside, else −1 (empty when no point is outside)
-  template <Element E>
+  template <class E>
   struct Runs {
     using element = E;
     std::vector<std::array<Index, E::num_nodes>> nodes;
