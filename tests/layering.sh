@@ -7,7 +7,7 @@
 #   - headers have #pragma once and leave the slow third-party headers to .cpp files
 #   - only apps print
 set -uo pipefail
-cd "$1"
+cd "$1" || exit
 
 layers=(elements framework reconstruction experiments apps)
 violations=0
@@ -20,7 +20,7 @@ report() {  # report FILE:LINE REASON
 allowed=()
 for layer in "${layers[@]}"; do
   allowed+=("$layer")
-  [[ -d $layer ]] || continue
+  [[ -d $layer ]] || report "$layer:0" "no such directory"
 
   while IFS=: read -r file line text; do
     include=$(sed -E 's/^[^<"]*[<"]([^>"]*)[>"].*/\1/' <<<"$text")
