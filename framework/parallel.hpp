@@ -12,4 +12,7 @@ namespace halfgrad {
 void parallel_for(std::int64_t count, std::int64_t grain,
                   const std::function<void(std::int64_t begin, std::int64_t end)>& body);
 
+/// Number of threads that parallel_for may use here.
+int num_threads();
+
 }  // namespace halfgrad

@@ -1,0 +1,190 @@
+// The inverse map X → ξ of one cell: closed form where x(ξ) is affine, a safeguarded Newton iteration elsewhere.
+#pragma once
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "elements/element.hpp"
+
+namespace halfgrad {
+
+/// ξ of a position in a cell. Where converged is false no ξ maps to the position as far as was found: it lies outside,
+/// beyond a fold of the map.
+template <Element E>
+struct InverseMapResult {
+  ReferencePoint<E> xi;
+  bool converged = false;  ///< |x(ξ) − X| ≤ 1e-12 of the cell's extent, axis by axis
+};
+
+/// The inverse map of a cell by its node positions. Works relative to the first node and in units of the cell's extent
+/// along each axis (powers of two, so that scaling is exact): neither offset, scale nor stretching along the axes costs
+/// digits.
+template <Element E>
+class InverseMap {
+ public:
+  using Point = ReferencePoint<E>;
+  using Jacobian = Eigen::Matrix<double, E::dim, E::dim>;
+
+  /// `positions`: num_nodes × dim.
+  explicit InverseMap(const NodeMatrix<E>& positions) : origin_(positions.row(0).transpose()) {
+    nodes_ = positions.rowwise() - positions.row(0);
+    for (int a = 0; a < E::dim; ++a) {
+      const double extent = nodes_.col(a).maxCoeff() - nodes_.col(a).minCoeff();
+      int exponent = 0;
+      if (extent > 0) std::frexp(extent, &exponent);
+      scale_[a] = std::ldexp(1.0, -exponent);
+      nodes_.col(a) *= scale_[a];
+    }
+    const Jacobian jacobian = nodes_.transpose() * E::shape_gradient(E::center());
+    determinant_ = jacobian.determinant();
+    if (degenerate()) return;
+    inverse_ = jacobian.inverse();
+    const NodeMatrix<E> reference = E::nodes();
+    if constexpr (!E::affine) {
+      const NodeMatrix<E> image = (reference.rowwise() - reference.row(0)) * jacobian.transpose();
+      affine_ = (image - nodes_).cwiseAbs().maxCoeff() <= 1e-14;
+      if (!affine_) measure_distortion();
+    }
+  }
+
+  /// Whether the cell has no volume to rounding: it has no inverse map, and no other member but this may be used.
+  bool degenerate() const { return !(std::abs(determinant_) > 1e-14); }
+  /// Whether x(ξ) is affine on this cell.
+  bool affine() const { return affine_; }
+  /// β = shape(ξ(X)) is linear in X: ∂β_i/∂X_a, num_nodes × dim, of the affine part at the center.
+  NodeMatrix<E> weight_gradient() const { return E::shape_gradient(E::center()) * inverse_ * scale_.asDiagonal(); }
+  /// ∂x/∂ξ in length units, dim × dim.
+  Jacobian jacobian(const Point& xi) const { return scale_.cwiseInverse().asDiagonal() * scaled_jacobian(xi); }
+  /// X − x(ξ), dim × 1, in length units.
+  Point difference(const Point& position, const Point& xi) const {
+    return (scaled(position) - image(xi)).cwiseQuotient(scale_);
+  }
+
+  /// True where the linear part alone shows that the position lies outside the cell grown by `eps`.
+  bool surely_outside(const Point& position, double eps) const {
+    const Point guess = affine_guess(scaled(position));
+    return E::margin(guess) < -(eps + deviation_);
+  }
+
+  /// ξ of a position.
+  InverseMapResult<E> operator()(const Point& position) const {
+    const Point target = scaled(position);
+    if (affine_) return solve_affine(target);
+    InverseMapResult<E> result = newton(target, clamped(affine_guess(target)));
+    if (unique(result)) return result;
+    for (const double reach : {0.95, 0.5})
+      for (const Facet& facet : E::facets) {
+        if (try_start(target, facet_middle(facet), reach, result)) return result;
+        for (int i = 0; i < facet.num_nodes; ++i)
+          if (try_start(target, E::nodes().row(facet.nodes[i]).transpose(), reach, result)) return result;
+      }
+    return result;
+  }
+
+ private:
+  static constexpr double tolerance = 1e-12;
+
+  Point scaled(const Point& position) const { return (position - origin_).cwiseProduct(scale_); }
+  Point image(const Point& xi) const { return nodes_.transpose() * E::shape(xi); }
+  Jacobian scaled_jacobian(const Point& xi) const { return nodes_.transpose() * E::shape_gradient(xi); }
+  Point affine_guess(const Point& target) const { return E::center() + inverse_ * (target - image(E::center())); }
+  static Point clamped(const Point& xi) {
+    const NodeMatrix<E> nodes = E::nodes();
+    return xi.cwiseMax(nodes.colwise().minCoeff().transpose()).cwiseMin(nodes.colwise().maxCoeff().transpose());
+  }
+  static Point facet_middle(const Facet& facet) {
+    Point middle = Point::Zero();
+    for (int i = 0; i < facet.num_nodes; ++i) middle += E::nodes().row(facet.nodes[i]).transpose() / facet.num_nodes;
+    return middle;
+  }
+
+  // How far the map is from its linear part: the columns of J are mean values of the columns at the nodes, so their
+  // greatest deviation there bounds |J_c⁻¹ J − I| in the cell, and with it the distance of ξ from the affine guess.
+  void measure_distortion() {
+    const NodeMatrix<E> reference = E::nodes();
+    Eigen::Array<double, E::dim, 1> deviation = Eigen::Array<double, E::dim, 1>::Zero();
+    double radius = 0, lowest = determinant_, highest = determinant_;
+    for (int i = 0; i < E::num_nodes; ++i) {
+      const Point from_center = reference.row(i).transpose() - E::center();
+      radius = std::max(radius, from_center.norm());
+      // Just inside the node: rational shape functions may have no gradient at an apex.
+      const Jacobian at_node = scaled_jacobian(E::center() + 0.999999 * from_center);
+      const double determinant = at_node.determinant();
+      lowest = std::min(lowest, determinant);
+      highest = std::max(highest, determinant);
+      deviation = deviation.max((inverse_ * at_node - Jacobian::Identity()).colwise().norm().transpose().array());
+    }
+    // margin() measures along axes or barycentric directions: a factor of √dim covers both.
+    deviation_ = std::sqrt(E::dim) * deviation.matrix().norm() * radius;
+    one_signed_ = lowest > 0 || highest < 0;
+  }
+
+  InverseMapResult<E> solve_affine(const Point& target) const {
+    const Point first = E::nodes().row(0).transpose();
+    const Jacobian jacobian = scaled_jacobian(E::center());
+    InverseMapResult<E> result;
+    Point from_first = inverse_ * target;
+    // One step of refinement gives flat cells the residual that the inverse alone would not.
+    from_first += inverse_ * (target - jacobian * from_first);
+    result.xi = first + from_first;
+    result.converged = true;
+    return result;
+  }
+
+  // Newton with halved steps until the residual falls.
+  InverseMapResult<E> newton(const Point& target, const Point& start) const {
+    InverseMapResult<E> result{start, false};
+    Point difference = target - image(result.xi);
+    double residual = difference.norm();
+    const double floor = 4e-16 * std::max(1.0, target.norm());
+    for (int iteration = 0; iteration < 60 && residual > floor; ++iteration) {
+      Point step = scaled_jacobian(result.xi).inverse() * difference;
+      const double length = step.norm();
+      if (!std::isfinite(length)) break;
+      if (length > 1) step /= length;
+      const bool polishing = residual < 1e-10;
+      bool reduced = false;
+      for (double damping = 1; damping > 1e-4 && !reduced; damping *= 0.5) {
+        const Point trial = result.xi + damping * step;
+        const Point trial_difference = target - image(trial);
+        const double trial_residual = trial_difference.norm();
+        if (trial_residual < (1 - 1e-3 * damping) * residual) {
+          reduced = true;
+          result.xi = trial;
+          difference = trial_difference;
+          residual = trial_residual;
+        }
+        if (polishing) break;  // what a full step does not gain here is rounding
+      }
+      if (!reduced) break;
+    }
+    result.converged = residual <= tolerance * std::max(1.0, target.norm());
+    return result;
+  }
+
+  // Whether no other start can find a ξ in the cell: this one is in it, or on the side of the fold det J = 0 on which
+  // the cell lies, where the map is one to one.
+  bool unique(const InverseMapResult<E>& result) const {
+    if (!result.converged) return false;
+    if (E::margin(result.xi) >= 0) return true;
+    return one_signed_ && scaled_jacobian(result.xi).determinant() * determinant_ > 0;
+  }
+
+  // Iterates from a point between the center and `from`; keeps the ξ of greater margin. True where the search is over.
+  bool try_start(const Point& target, const Point& from, double reach, InverseMapResult<E>& best) const {
+    const InverseMapResult<E> other = newton(target, E::center() + reach * (from - E::center()));
+    if (other.converged && (!best.converged || E::margin(other.xi) > E::margin(best.xi))) best = other;
+    return best.converged && E::margin(best.xi) >= 0;
+  }
+
+  Point origin_;
+  Point scale_;
+  NodeMatrix<E> nodes_;  // relative to the origin, scaled
+  double determinant_ = 0;
+  Jacobian inverse_ = Jacobian::Zero();  // at the center, scaled
+  double deviation_ = 0;
+  bool affine_ = E::affine;
+  bool one_signed_ = true;
+};
+
+}  // namespace halfgrad
