@@ -1,0 +1,35 @@
+// Files that appear under their name when they are whole.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace halfgrad {
+
+/// A file that is written as ".name.part-PID" beside its name and renamed by commit(). Destruction without commit()
+/// removes it. All failures throw Error with the path and the system's reason.
+class OutputFile {
+ public:
+  explicit OutputFile(const std::filesystem::path& path);
+  ~OutputFile();
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  void write(std::string_view bytes);
+  /// Overwrites bytes written before, for headers that hold a count.
+  void overwrite(std::int64_t offset, std::string_view bytes);
+  /// Ends writing without renaming, so that many files can wait for one commit.
+  void close();
+  void commit();
+
+ private:
+  std::filesystem::path path_, part_;
+  int descriptor_ = -1;
+};
+
+/// Writes a whole file at once.
+void write_text_atomically(const std::filesystem::path& path, std::string_view text);
+
+}  // namespace halfgrad

@@ -1,0 +1,28 @@
+// Points to be carried, with what their file says besides.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "framework/mesh.hpp"
+
+namespace halfgrad {
+
+/// Points of a file, in its order and count.
+struct PointSet {
+  Points points;                ///< #points × 2 or 3
+  IndexTable faces;             ///< polygons by point number; no rows where the file has none
+  Values<double> displacement;  ///< #points × 3, the point vector `displacement` of a VTK file; empty where absent
+  std::string obj_text;         ///< the whole text of an OBJ file, which OBJ output repeats but for its "v" lines
+};
+
+/// Reads .obj, .ply, .stl (three points a facet, in file order), .vtk, .vtp, .vtu, .npy (#points × 2|3) and, as their
+/// vertices, the mesh formats. Throws Error, naming the file and the line, byte or point, on anything unreadable and on
+/// non-finite coordinates.
+PointSet read_points(const std::filesystem::path& path);
+
+/// The points with gdim coordinates: z is dropped where it is constant (relative to the largest coordinate, 1e-12).
+/// Throws Error where it is not, or where there are fewer coordinates than gdim. `name` is for the message.
+Points in_dimension(const Points& points, int gdim, const std::string& name);
+
+}  // namespace halfgrad
