@@ -32,7 +32,7 @@ struct Geometry {
   Values<double> displacement;
   std::string obj_text;
 
-  /// Appends a cell. Vertex numbers are only narrowed here; out of range ones are found by check().
+  /// Appends a cell. Numbers out of range are left to check().
   void add_cell(int vtk_id, std::span<const std::int64_t> nodes);
 };
 

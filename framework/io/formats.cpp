@@ -1,0 +1,82 @@
+#include "framework/io/formats.hpp"
+
+#include <algorithm>
+#include <cctype>
+
+#include "framework/error.hpp"
+#include "framework/io/gmsh.hpp"
+#include "framework/io/npy.hpp"
+#include "framework/io/obj.hpp"
+#include "framework/io/pc2.hpp"
+#include "framework/json_reader.hpp"
+
+namespace halfgrad {
+
+namespace {
+
+bool serves(const Format& format, FormatUse use) {
+  switch (use) {
+    case FormatUse::read_mesh:
+      return format.has_cells;
+    case FormatUse::read_points:
+      return format.read != nullptr;
+    case FormatUse::open_frames:
+      return format.read != nullptr || format.open_frames != nullptr;
+    case FormatUse::create_frames:
+      return format.create_frames != nullptr;
+  }
+  return false;
+}
+
+std::string_view verb(FormatUse use) {
+  switch (use) {
+    case FormatUse::read_mesh:
+      return "meshes are read from";
+    case FormatUse::read_points:
+      return "points are read from";
+    case FormatUse::open_frames:
+      return "frames are read from";
+    case FormatUse::create_frames:
+      return "frames are written as";
+  }
+  return "";
+}
+
+}  // namespace
+
+const std::vector<Format>& formats() {
+  static const std::vector<Format> table = {
+      {"Gmsh", {".msh"}, true, read_gmsh, nullptr, nullptr},
+      {"Wavefront OBJ", {".obj"}, false, read_obj, nullptr, create_obj_frames},
+      {"NumPy", {".npy"}, false, read_npy_geometry, open_npy_frames, create_npy_frames},
+      {"PC2 point cache", {".pc2"}, false, nullptr, open_pc2_frames, create_pc2_frames},
+  };
+  return table;
+}
+
+const Format& find_format(const std::filesystem::path& path, FormatUse use) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::vector<std::string_view> serving;
+  std::string_view known_as;
+  for (const Format& format : formats()) {
+    const bool named =
+        std::find(format.extensions.begin(), format.extensions.end(), extension) != format.extensions.end();
+    if (named && serves(format, use)) return format;
+    if (named) known_as = format.name;
+    if (serves(format, use)) serving.insert(serving.end(), format.extensions.begin(), format.extensions.end());
+  }
+  const std::string nearest = nearest_name(extension, serving);
+  const std::string found = !known_as.empty()   ? fmt::format("{} ({})", extension, known_as)
+                            : extension.empty() ? "a name without extension"
+                                                : fmt::format("the unknown extension {}", extension);
+  raise("{}: found {}, but {} {}{}", path.string(), found, verb(use), join_names(serving),
+        known_as.empty() && !extension.empty() && !nearest.empty() ? fmt::format("; did you mean {}?", nearest) : "");
+}
+
+std::unique_ptr<FrameSink> create_frames(const std::filesystem::path& path, const PointSet& shape) {
+  return find_format(path, FormatUse::create_frames).create_frames(path, shape);
+}
+
+}  // namespace halfgrad
