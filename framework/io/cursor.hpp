@@ -33,6 +33,7 @@ class Cursor {
   Cursor(std::string name, std::string_view bytes, char comment = 0)
       : name_(std::move(name)), bytes_(bytes), comment_(comment) {}
 
+  const std::string& name() const { return name_; }
   std::size_t position() const { return position_; }
   void seek(std::size_t position) { position_ = std::min(position, bytes_.size()); }
   std::size_t remaining() const { return bytes_.size() - position_; }

@@ -5,9 +5,16 @@
 
 #include "framework/error.hpp"
 #include "framework/io/gmsh.hpp"
+#include "framework/io/medit.hpp"
 #include "framework/io/npy.hpp"
 #include "framework/io/obj.hpp"
 #include "framework/io/pc2.hpp"
+#include "framework/io/ply.hpp"
+#include "framework/io/pvd.hpp"
+#include "framework/io/stl.hpp"
+#include "framework/io/tetgen.hpp"
+#include "framework/io/vtk_legacy.hpp"
+#include "framework/io/vtk_xml.hpp"
 #include "framework/json_reader.hpp"
 
 namespace halfgrad {
@@ -47,9 +54,16 @@ std::string_view verb(FormatUse use) {
 const std::vector<Format>& formats() {
   static const std::vector<Format> table = {
       {"Gmsh", {".msh"}, true, read_gmsh, nullptr, nullptr},
+      {"legacy VTK", {".vtk"}, true, read_vtk_legacy, nullptr, nullptr},
+      {"VTK XML", {".vtu", ".vtp"}, true, read_vtk_xml, nullptr, nullptr},
+      {"MEDIT", {".mesh"}, true, read_medit, nullptr, nullptr},
+      {"TetGen", {".node", ".ele"}, true, read_tetgen, nullptr, nullptr},
       {"Wavefront OBJ", {".obj"}, false, read_obj, nullptr, create_obj_frames},
+      {"PLY", {".ply"}, false, read_ply, nullptr, nullptr},
+      {"STL", {".stl"}, false, read_stl, nullptr, nullptr},
       {"NumPy", {".npy"}, false, read_npy_geometry, open_npy_frames, create_npy_frames},
       {"PC2 point cache", {".pc2"}, false, nullptr, open_pc2_frames, create_pc2_frames},
+      {"ParaView collection", {".pvd"}, false, nullptr, open_pvd_frames, create_pvd_frames},
   };
   return table;
 }

@@ -1,0 +1,56 @@
+#include "framework/io/vtk_cells.hpp"
+
+#include "framework/error.hpp"
+
+namespace halfgrad {
+
+namespace {
+
+// Types whose nodes VTK numbers along the axes, and the cyclic order of their counterpart.
+struct AxisNumbered {
+  int vtk_id, counterpart, num_nodes;
+  int order[8];
+};
+constexpr AxisNumbered axis_numbered[] = {{8, 9, 4, {0, 1, 3, 2}}, {11, 12, 8, {0, 1, 3, 2, 4, 5, 7, 6}}};
+
+int usual_type(std::int64_t type, std::size_t num_nodes) {
+  if (type == 7 && num_nodes == 3) return 5;
+  if (type == 7 && num_nodes == 4) return 9;
+  return type >= 0 && type < 256 ? static_cast<int>(type) : -1;
+}
+
+}  // namespace
+
+void VtkCells::add_to(Geometry& geometry, const std::vector<std::int64_t>& types, std::int64_t first_vertex) const {
+  const std::size_t count = offsets.empty() ? 0 : offsets.size() - 1;
+  if (count != types.size())
+    raise("{}: found {} cells and {} cell types, expected one each", name, count, types.size());
+  if (count > 0 && offsets[0] != 0)
+    raise("{}: found {} as the first offset of the cells, expected 0", name, offsets[0]);
+  std::vector<std::int64_t> cell;
+  for (std::size_t c = 0; c < count; ++c) {
+    const std::int64_t begin = offsets[c], end = offsets[c + 1];
+    if (begin > end || end > static_cast<std::int64_t>(nodes.size()))
+      raise("{}: cell {} has nodes {} to {}, expected ascending offsets up to {}", name, c, begin, end, nodes.size());
+    cell.assign(nodes.begin() + begin, nodes.begin() + end);
+    int type = usual_type(types[c], cell.size());
+    for (const AxisNumbered& other : axis_numbered)
+      if (type == other.vtk_id && cell.size() == static_cast<std::size_t>(other.num_nodes)) {
+        for (int i = 0; i < other.num_nodes; ++i)
+          cell[static_cast<std::size_t>(i)] = nodes[static_cast<std::size_t>(begin + other.order[i])];
+        type = other.counterpart;
+        break;
+      }
+    // A negative number must not become valid by the shift.
+    for (std::int64_t& node : cell)
+      if (node >= 0 && node < (std::int64_t{1} << 40)) node += first_vertex;
+    geometry.add_cell(type, cell);
+  }
+}
+
+void VtkCells::add_to(Geometry& geometry, int type, std::int64_t first_vertex) const {
+  const std::size_t count = offsets.empty() ? 0 : offsets.size() - 1;
+  add_to(geometry, std::vector<std::int64_t>(count, type), first_vertex);
+}
+
+}  // namespace halfgrad

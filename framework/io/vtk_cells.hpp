@@ -1,0 +1,25 @@
+// Cells as VTK's files store them: offsets into one list of nodes.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "framework/io/geometry.hpp"
+
+namespace halfgrad {
+
+/// Cells of a file `name`; offsets has #cells + 1 entries that start with 0.
+struct VtkCells {
+  std::string name;
+  std::vector<std::int64_t> offsets, nodes;
+
+  /// Appends them to a geometry, with node numbers raised by `first_vertex`. Pixels and voxels become quadrilaterals
+  /// and hexahedra; polygons of three and four nodes triangles and quadrilaterals. Throws Error where offsets decrease
+  /// or leave the list, or where types are not one a cell.
+  void add_to(Geometry& geometry, const std::vector<std::int64_t>& types, std::int64_t first_vertex = 0) const;
+  /// The same with one type for all.
+  void add_to(Geometry& geometry, int type, std::int64_t first_vertex = 0) const;
+};
+
+}  // namespace halfgrad

@@ -1,0 +1,81 @@
+#include "framework/io/vtk_xml.hpp"
+
+#include "framework/error.hpp"
+#include "framework/io/cursor.hpp"
+#include "framework/io/vtk_cells.hpp"
+#include "framework/io/vtk_xml_data.hpp"
+
+namespace halfgrad {
+
+namespace {
+
+VtkCells read_cells(const VtkXmlFile& file, const std::string& name, pugi::xml_node node, std::int64_t count) {
+  VtkCells cells{name, {0}, {}};
+  const pugi::xml_node offsets = file.find_array(node, "offsets"), nodes = file.find_array(node, "connectivity");
+  if (!offsets || !nodes) file.fail(node, "has no DataArray of the names offsets and connectivity");
+  const std::vector<std::int64_t> ends = file.integers(offsets, count);
+  cells.offsets.insert(cells.offsets.end(), ends.begin(), ends.end());
+  if (cells.offsets.back() < 0) file.fail(offsets, fmt::format("found {} as the last offset", cells.offsets.back()));
+  cells.nodes = file.integers(nodes, cells.offsets.back());
+  return cells;
+}
+
+// Appends the rows of one piece.
+void append_rows(Points& rows, const std::vector<double>& more) {
+  const auto count = static_cast<Eigen::Index>(more.size() / 3), before = rows.rows();
+  rows.conservativeResize(before + count, 3);
+  rows.bottomRows(count) = Eigen::Map<const Points>(more.data(), count, 3);
+}
+
+}  // namespace
+
+Geometry read_vtk_xml(const std::filesystem::path& path) {
+  const InputFile input(path);
+  const VtkXmlFile file(input);
+  const std::string name = path.string();
+  const std::string_view type = file.root().attribute("type").as_string();
+  const bool is_grid = type == "UnstructuredGrid";
+  if (!is_grid && type != "PolyData")
+    file.fail(file.root(), fmt::format("found type \"{}\", expected UnstructuredGrid or PolyData", shown(type)));
+  const pugi::xml_node data = file.child(file.root(), is_grid ? "UnstructuredGrid" : "PolyData");
+
+  Geometry geometry;
+  geometry.vertices.resize(0, 3);
+  geometry.displacement.resize(0, 3);
+  for (pugi::xml_node piece : data.children("Piece")) {
+    const std::int64_t first_vertex = geometry.vertices.rows(), num_points = file.count(piece, "NumberOfPoints");
+    // Three numbers a point, at best compressed 1000-fold: whatever exceeds this is refused before it is multiplied.
+    if (static_cast<std::uint64_t>(num_points) > 1000 * input.bytes().size())
+      file.fail(piece, fmt::format("found {} points in a file of {} bytes", num_points, input.bytes().size()));
+    if (num_points == 0) continue;
+    const pugi::xml_node points = file.child(file.child(piece, "Points"), "DataArray");
+    if (const std::int64_t width = file.count(points, "NumberOfComponents"); width != 3)
+      file.fail(points, fmt::format("found {} components, expected 3", width));
+    append_rows(geometry.vertices, file.numbers(points, 3 * num_points));
+    const pugi::xml_node displacement = file.find_array(piece.child("PointData"), "displacement");
+    if (displacement && std::string_view(displacement.attribute("NumberOfComponents").as_string()) == "3")
+      append_rows(geometry.displacement, file.numbers(displacement, 3 * num_points));
+    if (is_grid) {
+      const std::int64_t num_cells = file.count(piece, "NumberOfCells");
+      if (num_cells == 0) continue;
+      const pugi::xml_node node = file.child(piece, "Cells");
+      const VtkCells cells = read_cells(file, name, node, num_cells);
+      const pugi::xml_node types = file.find_array(node, "types");
+      if (!types) file.fail(node, "has no DataArray of the name types");
+      cells.add_to(geometry, file.integers(types, num_cells), first_vertex);
+    } else {
+      constexpr std::tuple<const char*, const char*, int> kinds[] = {{"Verts", "NumberOfVerts", 2},
+                                                                     {"Lines", "NumberOfLines", 4},
+                                                                     {"Strips", "NumberOfStrips", 6},
+                                                                     {"Polys", "NumberOfPolys", 7}};
+      for (const auto& [tag, attribute, id] : kinds)
+        if (piece.attribute(attribute) && file.count(piece, attribute) > 0)
+          read_cells(file, name, file.child(piece, tag), file.count(piece, attribute))
+              .add_to(geometry, id, first_vertex);
+    }
+  }
+  if (geometry.displacement.rows() != geometry.vertices.rows()) geometry.displacement.resize(0, 3);
+  return geometry;
+}
+
+}  // namespace halfgrad
