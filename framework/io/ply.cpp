@@ -73,6 +73,8 @@ class PlyReader {
         in_.line();
       } else if (word == "element") {
         const std::string name(in_.word("the name of an element"));
+        if (std::any_of(elements_.begin(), elements_.end(), [&](const auto& e) { return e.name == name; }))
+          in_.fail_at_line("a second element {}", shown(name));
         elements_.push_back({name, in_.integer("the number of an element"), {}});
       } else if (word == "property" && !elements_.empty()) {
         Property property;

@@ -2,12 +2,23 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "framework/io/geometry.hpp"
 
 namespace halfgrad {
+
+/// A stored value as a T. Floating values beyond the integers become the least one, which no check lets pass.
+template <class T, class Stored>
+T converted(Stored value) {
+  if constexpr (std::is_integral_v<T> && std::is_floating_point_v<Stored>)
+    return value > -9e18 && value < 9e18 ? static_cast<T>(value) : std::numeric_limits<T>::min();
+  else
+    return static_cast<T>(value);
+}
 
 /// Cells of a file `name`; offsets has #cells + 1 entries that start with 0.
 struct VtkCells {

@@ -135,7 +135,7 @@ class LegacyReader {
       if (binary_) {
         in_.line();
         constexpr bool swap = std::endian::native == std::endian::little;
-        for (std::int64_t i = 0; i < count; ++i) found.push_back(static_cast<T>(in_.binary<Stored>(what, swap)));
+        for (std::int64_t i = 0; i < count; ++i) found.push_back(converted<T>(in_.binary<Stored>(what, swap)));
       } else {
         for (std::int64_t i = 0; i < count; ++i)
           if constexpr (std::is_integral_v<T>)

@@ -6,6 +6,7 @@
 
 #include "framework/io/base64.hpp"
 #include "framework/io/cursor.hpp"
+#include "framework/io/vtk_cells.hpp"
 
 namespace halfgrad {
 
@@ -134,7 +135,7 @@ std::vector<T> VtkXmlFile::values(pugi::xml_node array, std::int64_t expected) c
     for (std::size_t i = 0; i < count; ++i) {
       Stored value;
       std::memcpy(&value, bytes.data() + i * sizeof(Stored), sizeof(Stored));
-      found[i] = static_cast<T>(swap_ ? byte_swapped(value) : value);
+      found[i] = converted<T>(swap_ ? byte_swapped(value) : value);
     }
   });
   if (!known) fail(array, fmt::format("found type \"{}\", expected a number type such as Float64", shown(type)));
