@@ -11,7 +11,7 @@ namespace {
 // The first word of a line, and what follows it.
 std::pair<std::string_view, std::string_view> split_word(std::string_view line) {
   const std::size_t begin = std::min(line.find_first_not_of(" \t"), line.size());
-  const std::size_t end = std::min(line.find_first_of(" \t\r", begin), line.size());
+  const std::size_t end = std::min(line.find_first_of(" \t\r\n", begin), line.size());
   return {line.substr(begin, end - begin), line.substr(end)};
 }
 

@@ -6,12 +6,14 @@ namespace halfgrad {
 
 namespace {
 
-// Types whose nodes VTK numbers along the axes, and the cyclic order of their counterpart.
-struct AxisNumbered {
-  int vtk_id, counterpart, num_nodes;
+// Types whose nodes the files number otherwise, and the order of the element they become: pixels and voxels along the
+// axes; wedges with the first triangle seen from inside (as meshio and Gmsh write them).
+struct OtherOrder {
+  int vtk_id, element_id, num_nodes;
   int order[8];
 };
-constexpr AxisNumbered axis_numbered[] = {{8, 9, 4, {0, 1, 3, 2}}, {11, 12, 8, {0, 1, 3, 2, 4, 5, 7, 6}}};
+constexpr OtherOrder other_orders[] = {
+    {8, 9, 4, {0, 1, 3, 2}}, {11, 12, 8, {0, 1, 3, 2, 4, 5, 7, 6}}, {13, 13, 6, {0, 2, 1, 3, 5, 4}}};
 
 int usual_type(std::int64_t type, std::size_t num_nodes) {
   if (type == 7 && num_nodes == 3) return 5;
@@ -34,11 +36,11 @@ void VtkCells::add_to(Geometry& geometry, const std::vector<std::int64_t>& types
       raise("{}: cell {} has nodes {} to {}, expected ascending offsets up to {}", name, c, begin, end, nodes.size());
     cell.assign(nodes.begin() + begin, nodes.begin() + end);
     int type = usual_type(types[c], cell.size());
-    for (const AxisNumbered& other : axis_numbered)
+    for (const OtherOrder& other : other_orders)
       if (type == other.vtk_id && cell.size() == static_cast<std::size_t>(other.num_nodes)) {
         for (int i = 0; i < other.num_nodes; ++i)
           cell[static_cast<std::size_t>(i)] = nodes[static_cast<std::size_t>(begin + other.order[i])];
-        type = other.counterpart;
+        type = other.element_id;
         break;
       }
     // A negative number must not become valid by the shift.
@@ -46,6 +48,13 @@ void VtkCells::add_to(Geometry& geometry, const std::vector<std::int64_t>& types
       if (node >= 0 && node < (std::int64_t{1} << 40)) node += first_vertex;
     geometry.add_cell(type, cell);
   }
+}
+
+int file_node(int vtk_id, int node) {
+  // A file's order that is its own inverse, as that of the wedge, serves both ways.
+  for (const OtherOrder& other : other_orders)
+    if (other.vtk_id == vtk_id) return other.order[node];
+  return node;
 }
 
 void VtkCells::add_to(Geometry& geometry, int type, std::int64_t first_vertex) const {

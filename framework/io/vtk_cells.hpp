@@ -33,4 +33,7 @@ struct VtkCells {
   void add_to(Geometry& geometry, int type, std::int64_t first_vertex = 0) const;
 };
 
+/// The element's node that a file of this VTK type names at a place.
+int file_node(int vtk_id, int node);
+
 }  // namespace halfgrad

@@ -4,6 +4,7 @@
 
 #include "framework/error.hpp"
 #include "framework/io/output_file.hpp"
+#include "framework/io/vtk_cells.hpp"
 #include "framework/io/vtk_output_text.hpp"
 
 namespace halfgrad {
@@ -156,8 +157,8 @@ void write_vtu(const std::filesystem::path& path, const Mesh& mesh, std::span<co
   std::vector<std::int64_t> nodes, ends;
   std::vector<std::uint8_t> types;
   for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
-    nodes.insert(nodes.end(), block.cells.data(), block.cells.data() + block.cells.size());
     for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
+      for (int i = 0; i < E::num_nodes; ++i) nodes.push_back(block.cells(c, file_node(E::vtk_id, i)));
       ends.push_back((ends.empty() ? 0 : ends.back()) + E::num_nodes);
       types.push_back(E::vtk_id);
     }
