@@ -1,5 +1,7 @@
 #include "framework/io/vtk_xml.hpp"
 
+#include <pugixml.hpp>
+
 #include "framework/error.hpp"
 #include "framework/io/cursor.hpp"
 #include "framework/io/vtk_cells.hpp"

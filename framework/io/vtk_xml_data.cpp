@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <pugixml.hpp>
 
 #include "framework/io/base64.hpp"
 #include "framework/io/cursor.hpp"
@@ -32,7 +33,8 @@ constexpr std::size_t greatest_zlib_ratio = 1032;
 
 }  // namespace
 
-VtkXmlFile::VtkXmlFile(const InputFile& file) : name_(file.path().string()), text_(file.bytes()) {
+VtkXmlFile::VtkXmlFile(const InputFile& file)
+    : name_(file.path().string()), text_(file.bytes()), document_(std::make_unique<pugi::xml_document>()) {
   // Raw appended data would break the XML parser: the text ends where it begins.
   std::string xml(text_);
   const std::size_t tag = text_.find("<AppendedData");
@@ -43,26 +45,30 @@ VtkXmlFile::VtkXmlFile(const InputFile& file) : name_(file.path().string()), tex
     appended_is_raw_ = text_.substr(tag, begin - tag).find("base64") == std::string_view::npos;
     xml = std::string(text_.substr(0, tag)) + "</VTKFile>";
   }
-  const pugi::xml_parse_result result = document_.load_buffer(xml.data(), xml.size());
+  const pugi::xml_parse_result result = document_->load_buffer(xml.data(), xml.size());
   if (!result) {
     const auto at = text_.begin() + std::min<std::ptrdiff_t>(result.offset, static_cast<std::ptrdiff_t>(text_.size()));
     raise("{}:{}: found malformed XML: {}", name_, 1 + std::count(text_.begin(), at, '\n'), result.description());
   }
-  root_ = document_.child("VTKFile");
-  if (!root_) raise("{}: found <{}>, expected <VTKFile>", name_, shown(document_.first_child().name()));
-  const std::string_view order = root_.attribute("byte_order").as_string("LittleEndian");
+  const pugi::xml_node file_root = document_->child("VTKFile");
+  if (!file_root) raise("{}: found <{}>, expected <VTKFile>", name_, shown(document_->first_child().name()));
+  const std::string_view order = file_root.attribute("byte_order").as_string("LittleEndian");
   if (order != "LittleEndian" && order != "BigEndian")
-    fail(root_, fmt::format("found byte_order \"{}\", expected LittleEndian or BigEndian", shown(order)));
+    fail(file_root, fmt::format("found byte_order \"{}\", expected LittleEndian or BigEndian", shown(order)));
   swap_ = (order == "BigEndian") != (std::endian::native == std::endian::big);
-  const std::string_view compressor = root_.attribute("compressor").as_string();
+  const std::string_view compressor = file_root.attribute("compressor").as_string();
   if (!compressor.empty() && compressor != "vtkZLibDataCompressor")
-    fail(root_, fmt::format("found compressor \"{}\", expected vtkZLibDataCompressor or none", shown(compressor)));
+    fail(file_root, fmt::format("found compressor \"{}\", expected vtkZLibDataCompressor or none", shown(compressor)));
   compressed_ = !compressor.empty();
-  const std::string_view header_type = root_.attribute("header_type").as_string("UInt32");
+  const std::string_view header_type = file_root.attribute("header_type").as_string("UInt32");
   if (header_type != "UInt32" && header_type != "UInt64")
-    fail(root_, fmt::format("found header_type \"{}\", expected UInt32 or UInt64", shown(header_type)));
+    fail(file_root, fmt::format("found header_type \"{}\", expected UInt32 or UInt64", shown(header_type)));
   header_size_ = header_type == "UInt64" ? 8 : 4;
 }
+
+VtkXmlFile::~VtkXmlFile() = default;
+
+pugi::xml_node VtkXmlFile::root() const { return document_->child("VTKFile"); }
 
 void VtkXmlFile::fail(pugi::xml_node node, const std::string& message) const {
   const auto offset = std::clamp<std::ptrdiff_t>(node.offset_debug(), 0, static_cast<std::ptrdiff_t>(text_.size()));

@@ -1,12 +1,17 @@
 // The data arrays of XML VTK files.
 #pragma once
 
-#include <pugixml.hpp>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "framework/io/input_file.hpp"
+
+namespace pugi {
+class xml_document;
+class xml_node;
+}  // namespace pugi
 
 namespace halfgrad {
 
@@ -15,8 +20,9 @@ class VtkXmlFile {
  public:
   /// Throws Error where the XML is malformed or the root is not VTKFile.
   explicit VtkXmlFile(const InputFile& file);
+  ~VtkXmlFile();
 
-  pugi::xml_node root() const { return root_; }
+  pugi::xml_node root() const;
   /// The child of a node that must be there.
   pugi::xml_node child(pugi::xml_node node, const char* name) const;
   /// A count given as an attribute.
@@ -40,8 +46,7 @@ class VtkXmlFile {
 
   std::string name_;
   std::string_view text_;
-  pugi::xml_document document_;
-  pugi::xml_node root_;
+  std::unique_ptr<pugi::xml_document> document_;
   std::string_view appended_;
   bool appended_is_raw_ = false, swap_ = false, compressed_ = false;
   std::size_t header_size_ = 4;
