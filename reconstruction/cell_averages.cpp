@@ -1,12 +1,12 @@
 #include "reconstruction/cell_averages.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "framework/error.hpp"
 #include "reconstruction/row_assembly.hpp"
+#include "reconstruction/symmetric_eigen.hpp"
 
 namespace halfgrad {
 
@@ -54,15 +54,15 @@ CellWeights consistent_weights(const std::vector<UsableCell>& usable, double eps
     sum += direction;
   }
   // The eigenbasis solves the small symmetric system and tells its rank.
-  const Eigen::SelfAdjointEigenSolver<SmallMatrix> solver(normal + epsilon * SmallMatrix::Identity(gdim, gdim));
+  const SymmetricEigen eigen = symmetric_eigen(normal + epsilon * SmallMatrix::Identity(gdim, gdim));
   const double singular = 1e-12 * static_cast<double>(usable.size());
-  if (!(solver.eigenvalues()[0] > singular))
+  if (!(eigen.values[0] > singular))
     raise(
         "chandrashekar_garg: the weights of vertex {} are not determined with epsilon {} (least eigenvalue {:.3g}): "
         "use epsilon > 0",
-        vertex, epsilon, solver.eigenvalues()[0]);
-  const Vector lambda = -(solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() *
-                          solver.eigenvectors().transpose() * sum);
+        vertex, epsilon, eigen.values[0]);
+  const Vector lambda = -(eigen.vectors * eigen.values.cwiseInverse().asDiagonal() *
+                          eigen.vectors.transpose() * sum);
   std::vector<double> raw;
   double total = 0, magnitude = 0;
   for (const UsableCell& cell : usable) {
@@ -96,6 +96,13 @@ Reconstruction CellAverage::reconstruct(const CellGradients& cells, std::span<co
 CellWeights UnweightedAverage::weights(const CellGradients& cells, Index vertex) const {
   const std::vector<UsableCell> usable = adjacent_cells(cells, vertex);
   return normalised(usable, std::vector<double>(usable.size(), 1.0));
+}
+
+CellWeights InverseDistance::weights(const CellGradients& cells, Index vertex) const {
+  const std::vector<UsableCell> usable = adjacent_cells(cells, vertex);
+  std::vector<double> raw;
+  for (const UsableCell& cell : usable) raw.push_back(1 / cell.offset.norm());
+  return normalised(usable, raw);
 }
 
 CellWeights VolumeAverage::weights(const CellGradients& cells, Index vertex) const {

@@ -32,6 +32,12 @@ class VolumeAverage final : public CellAverage {
   CellWeights weights(const CellGradients& cells, Index vertex) const override;
 };
 
+/// w_k = 1 / |centroid of cell k − vertex|.
+class InverseDistance final : public CellAverage {
+ public:
+  CellWeights weights(const CellGradients& cells, Index vertex) const override;
+};
+
 struct ChandrashekarGargOptions {
   double epsilon = 1;  ///< Tikhonov parameter, dimensionless, ≥ 0
 };

@@ -5,6 +5,7 @@
 
 #include "framework/error.hpp"
 #include "reconstruction/cell_averages.hpp"
+#include "reconstruction/kriging.hpp"
 
 namespace halfgrad {
 
@@ -18,6 +19,10 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
                          [](JsonReader&) -> std::unique_ptr<VertexGradientReconstructor> {
                            return std::make_unique<VolumeAverage>();
                          }},
+      ReconstructorEntry{"inverse_distance", "mean of the adjacent cells' gradients, weighted by 1 / distance to centroid",
+                         [](JsonReader&) -> std::unique_ptr<VertexGradientReconstructor> {
+                           return std::make_unique<InverseDistance>();
+                         }},
       ReconstructorEntry{"chandrashekar_garg", "James 2020, Eq. 24-27: inverse-distance weights, Tikhonov epsilon",
                          [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
                            return std::make_unique<ChandrashekarGarg>(
@@ -29,6 +34,15 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
                            knn.k = static_cast<int>(options.integer("k", knn.k));
                            knn.epsilon = options.number("epsilon", knn.epsilon);
                            return std::make_unique<Knn>(knn);
+                         }},
+      ReconstructorEntry{"kriging", "vertex stencil, exact for quadratics (or cubics), Matern prior for the rest",
+                         [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
+                           KrigingOptions kriging;
+                           if (options.choice("drift", {"quadratic", "cubic"}, "quadratic") == "cubic")
+                             kriging.drift = KrigingDrift::cubic;
+                           if (options.choice("patch", {"wide", "lean"}, "wide") == "lean")
+                             kriging.patch = KrigingPatch::lean;
+                           return std::make_unique<Kriging>(kriging);
                          }},
   };
   return entries;

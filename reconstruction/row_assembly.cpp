@@ -1,6 +1,8 @@
 #include "reconstruction/row_assembly.hpp"
 
 #include <algorithm>
+#include <mutex>
+#include <utility>
 
 #include "framework/parallel.hpp"
 
@@ -13,14 +15,52 @@ void StencilRow::clear() {
   diagnostics = {};
 }
 
-GradientStencilTable assemble_rows(int gdim, std::span<const Index> vertices,
-                                   const std::function<void(Index, StencilRow&)>& make_row) {
+namespace {
+
+// Workspaces in stock: a range of work takes one and gives it back.
+class WorkerPool {
+ public:
+  explicit WorkerPool(const std::function<RowMaker()>& make_worker) : make_worker_(make_worker) {}
+
+  RowMaker take() {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!idle_.empty()) {
+        RowMaker worker = std::move(idle_.back());
+        idle_.pop_back();
+        return worker;
+      }
+    }
+    return make_worker_();
+  }
+
+  void give_back(RowMaker worker) {
+    const std::lock_guard lock(mutex_);
+    idle_.push_back(std::move(worker));
+  }
+
+ private:
+  const std::function<RowMaker()>& make_worker_;
+  std::mutex mutex_;
+  std::vector<RowMaker> idle_;
+};
+
+}  // namespace
+
+GradientStencilTable assemble_rows(int gdim, std::span<const Index> vertices, const RowMaker& make_row) {
+  return assemble_rows_with_workers(gdim, vertices, [&]() -> RowMaker { return std::cref(make_row); });
+}
+
+GradientStencilTable assemble_rows_with_workers(int gdim, std::span<const Index> vertices,
+                                                const std::function<RowMaker()>& make_worker) {
   // Fixed chunks, each with its own table, joined in order: the same bits for any schedule.
   constexpr std::int64_t chunk_size = 64;
   const std::int64_t num_vertices = static_cast<std::int64_t>(vertices.size());
   const std::int64_t num_chunks = (num_vertices + chunk_size - 1) / chunk_size;
   std::vector<GradientStencilTable> chunks(num_chunks);
+  WorkerPool workers(make_worker);
   parallel_for(num_chunks, 1, [&](std::int64_t begin, std::int64_t end) {
+    RowMaker make_row = workers.take();
     StencilRow row;
     for (std::int64_t c = begin; c < end; ++c) {
       GradientStencilTable& chunk = chunks[c];
@@ -35,6 +75,7 @@ GradientStencilTable assemble_rows(int gdim, std::span<const Index> vertices,
         chunk.diagnostics.push_back(row.diagnostics);
       }
     }
+    workers.give_back(std::move(make_row));
   });
   GradientStencilTable table;
   table.gdim = gdim;

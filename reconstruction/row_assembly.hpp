@@ -20,10 +20,17 @@ struct StencilRow {
   void clear();
 };
 
+/// Writes the row of a vertex into a cleared row.
+using RowMaker = std::function<void(Index vertex, StencilRow& row)>;
+
 /// Fills a table: make_row(vertex, row) is called once a vertex, from several threads, on a cleared row. The result
 /// does not depend on the number of threads.
-GradientStencilTable assemble_rows(int gdim, std::span<const Index> vertices,
-                                   const std::function<void(Index vertex, StencilRow& row)>& make_row);
+GradientStencilTable assemble_rows(int gdim, std::span<const Index> vertices, const RowMaker& make_row);
+
+/// The same for makers that own workspace: make_worker() is called at most once a thread at work, and each maker it
+/// returns serves one thread at a time. Rows must not depend on what a maker did before.
+GradientStencilTable assemble_rows_with_workers(int gdim, std::span<const Index> vertices,
+                                                const std::function<RowMaker()>& make_worker);
 
 /// The row Σ_k w_k F_k of a vertex: cell gradients composed to vertex differences, the vertex itself left out (its
 /// weight is minus the sum of the others). Neighbours ascend.

@@ -1,0 +1,215 @@
+#include "reconstruction/kriging.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "framework/error.hpp"
+#include "reconstruction/cell_averages.hpp"
+#include "reconstruction/kriging_system.hpp"
+#include "reconstruction/row_assembly.hpp"
+#include "reconstruction/symmetric_eigen.hpp"
+#include "reconstruction/vertex_rings.hpp"
+
+namespace halfgrad {
+
+namespace {
+
+// The nearest num_points vertices within some rings.
+struct PatchRule {
+  int rings;
+  int num_points;
+};
+constexpr int all = std::numeric_limits<int>::max();
+using Schedule = std::span<const PatchRule>;
+
+constexpr std::array<PatchRule, 3> wide1 = {{{2, 4}, {3, 6}, {4, 8}}};
+constexpr std::array<PatchRule, 4> wide2 = {{{2, 16}, {3, 20}, {3, 28}, {4, 36}}};
+constexpr std::array<PatchRule, 4> wide3 = {{{2, 32}, {3, 45}, {3, 60}, {4, 90}}};
+constexpr std::array<PatchRule, 4> lean1 = {{{1, all}, {2, 4}, {3, 6}, {4, 8}}};
+constexpr std::array<PatchRule, 4> lean2 = {{{1, all}, {2, 12}, {3, 20}, {4, 28}}};
+constexpr std::array<PatchRule, 5> lean3 = {{{1, all}, {2, 32}, {3, 45}, {3, 60}, {4, 90}}};
+constexpr std::array<PatchRule, 3> cubic1 = {{{2, 4}, {3, 6}, {4, 8}}};
+constexpr std::array<PatchRule, 3> cubic2 = {{{3, 24}, {4, 32}, {4, 45}}};
+constexpr std::array<PatchRule, 3> cubic3 = {{{3, 60}, {4, 90}, {4, 130}}};
+
+Schedule schedule_of(const KrigingOptions& options, int gdim) {
+  static constexpr std::array<Schedule, 3> wide = {wide1, wide2, wide3}, lean = {lean1, lean2, lean3},
+                                           cubic = {cubic1, cubic2, cubic3};
+  if (options.drift == KrigingDrift::cubic) return cubic[gdim - 1];
+  return options.patch == KrigingPatch::lean ? lean[gdim - 1] : wide[gdim - 1];
+}
+
+constexpr double accepted_singular_value = 5;
+// E2 beyond which most quadratic modes are missing, as on one or two isolated cells.
+constexpr double missing_modes = 0.75;
+// Squared ratio of the longest to the shortest axis of the edge tensor beyond which space is rescaled.
+constexpr double stretched = 16;
+
+// Makes rows with its own workspace.
+class KrigingRow {
+ public:
+  KrigingRow(const CellGradients& cells, const KrigingOptions& options)
+      : cells_(&cells),
+        schedule_(schedule_of(options, cells.gdim())),
+        accepted_sum_(options.drift == KrigingDrift::cubic ? 40 : 20),
+        rings_(cells),
+        system_(cells.gdim(), options.drift == KrigingDrift::cubic ? 3 : 2) {}
+
+  void operator()(Index vertex, StencilRow& row) {
+    row.diagnostics.rule = StencilRule::none;
+    rings_.start(vertex);
+    if (!find_metric(vertex)) return;
+    const std::size_t last = schedule_.size() - 1;
+    const std::size_t first = cells_->on_boundary(vertex) ? std::min<std::size_t>(1, last) : 0;
+    bool accepted = false;
+    for (std::size_t entry = first; entry <= last && !accepted; ++entry) {
+      select(vertex, schedule_[entry]);
+      if (entry > first && patch_ == previous_patch_) continue;
+      system_.solve(points_, fit_);
+      accepted = fit_.smallest_singular_value >= accepted_singular_value && fit_.absolute_sum <= accepted_sum_;
+      if (accepted || entry == first || fit_.expected_error < best_.expected_error) {
+        std::swap(best_, fit_);
+        best_patch_ = patch_;
+        best_entry_ = entry;
+      }
+      previous_patch_ = patch_;
+    }
+    row.diagnostics.schedule_entry = static_cast<std::uint8_t>(best_entry_);
+    row.diagnostics.smallest_singular_value = static_cast<float>(best_.smallest_singular_value);
+    row.diagnostics.expected_error = static_cast<float>(best_.expected_error);
+    if (best_.quadratic_response > missing_modes && fall_back(vertex, row)) return;
+    write(row);
+    row.diagnostics.rule =
+        !accepted ? StencilRule::damped : (best_entry_ == first ? StencilRule::full_fit : StencilRule::wider_patch);
+  }
+
+ private:
+  // The local unit of length and the coordinates in which patches are chosen and fitted: y = T (X − X_v). False where
+  // the vertex has no neighbour at a distance.
+  bool find_metric(Index vertex) {
+    const int gdim = cells_->gdim();
+    const auto origin = cells_->vertices().row(vertex);
+    const std::span<const Index> near = rings_.within(2);
+    distances_.clear();
+    for (Index v : near) distances_.push_back((cells_->vertices().row(v) - origin).squaredNorm());
+    const std::size_t count = std::min<std::size_t>(2 * gdim, distances_.size());
+    if (count == 0) return false;
+    std::nth_element(distances_.begin(), distances_.begin() + (count - 1), distances_.end());
+    // The sum must not depend on the order in which the vertices were found.
+    std::sort(distances_.begin(), distances_.begin() + count);
+    scale_ = 0;
+    for (std::size_t k = 0; k < count; ++k) scale_ += std::sqrt(distances_[k]) / static_cast<double>(count);
+    if (!(scale_ > 0)) return false;
+    metric_ = SmallMatrix::Identity(gdim, gdim) / scale_;
+    // The mean of e eᵀ over all pairs of vertices of the adjacent cells: their edges, on simplices.
+    SmallMatrix tensor = SmallMatrix::Zero(gdim, gdim);
+    double num_pairs = 0;
+    for (Index cell : cells_->cells_of(vertex)) {
+      const std::span<const Index> nodes = cells_->vertices_of(cell);
+      for (std::size_t i = 0; i < nodes.size(); ++i)
+        for (std::size_t j = 0; j < i; ++j, ++num_pairs) {
+          const Vector edge = (cells_->vertices().row(nodes[i]) - cells_->vertices().row(nodes[j])).transpose() / scale_;
+          tensor += edge * edge.transpose();
+        }
+    }
+    const SymmetricEigen eigen = symmetric_eigen(tensor * (gdim / num_pairs));
+    const double longest = eigen.values[gdim - 1];
+    if (longest > stretched * eigen.values[0])
+      metric_ = eigen.vectors * eigen.values.cwiseMax(1e-12 * longest).cwiseSqrt().cwiseInverse().asDiagonal() *
+                eigen.vectors.transpose() / scale_;
+    return true;
+  }
+
+  // Fills patch_ (ascending) and points_ with the nearest vertices of the rings. Where the distance of the last one
+  // ties with further ones, as on lattices, all of them are taken, so that numbering plays no part.
+  void select(Index vertex, const PatchRule& rule) {
+    const auto origin = cells_->vertices().row(vertex);
+    candidates_.clear();
+    for (Index v : rings_.within(rule.rings)) {
+      const Vector y = metric_ * (cells_->vertices().row(v) - origin).transpose();
+      candidates_.push_back({y.squaredNorm(), v});
+    }
+    patch_.clear();
+    double cut = std::numeric_limits<double>::infinity();
+    if (static_cast<std::size_t>(rule.num_points) < candidates_.size()) {
+      std::nth_element(candidates_.begin(), candidates_.begin() + (rule.num_points - 1), candidates_.end());
+      constexpr double tie = 1e-9;
+      cut = candidates_[rule.num_points - 1].first * (1 + 2 * tie);
+    }
+    for (const auto& [squared_distance, v] : candidates_)
+      if (squared_distance <= cut) patch_.push_back(v);
+    std::sort(patch_.begin(), patch_.end());
+    points_.resize(cells_->gdim(), static_cast<Eigen::Index>(patch_.size()));
+    for (std::size_t j = 0; j < patch_.size(); ++j)
+      points_.col(static_cast<Eigen::Index>(j)) = metric_ * (cells_->vertices().row(patch_[j]) - origin).transpose();
+  }
+
+  // The volume-weighted mean of the adjacent cells' gradients. False where no cell is usable.
+  bool fall_back(Index vertex, StencilRow& row) const {
+    const CellWeights average = VolumeAverage().weights(*cells_, vertex);
+    if (average.cells.empty()) return false;
+    compose_row(*cells_, vertex, average.cells, average.weights, row);
+    const Eigen::Index gdim = cells_->gdim(), count = static_cast<Eigen::Index>(row.neighbors.size());
+    const Eigen::Map<const Eigen::MatrixXd> weights(row.weights.data(), gdim, count);
+    row.diagnostics.absolute_sum = static_cast<float>(weights.colwise().norm().sum() * scale_);
+    row.diagnostics.rule = StencilRule::cell_value;
+    row.diagnostics.num_points = static_cast<Index>(count);
+    row.hessian_weights.assign(best_.hessian.rows() * count, 0.0);
+    return true;
+  }
+
+  // Back from the metric: ∂/∂X = T ∂/∂y.
+  void write(StencilRow& row) const {
+    const int gdim = cells_->gdim();
+    row.neighbors = best_patch_;
+    row.diagnostics.num_points = static_cast<Index>(best_patch_.size());
+    row.diagnostics.absolute_sum = static_cast<float>(best_.absolute_sum);
+    row.weights.resize(best_.gradient.size());
+    Eigen::Map<Eigen::MatrixXd>(row.weights.data(), best_.gradient.rows(), best_.gradient.cols()).noalias() =
+        metric_ * best_.gradient;
+    row.hessian_weights.resize(best_.hessian.size());
+    for (Eigen::Index j = 0; j < best_.hessian.cols(); ++j) {
+      SmallMatrix hessian(gdim, gdim);
+      for (int a = 0, s = 0; a < gdim; ++a)
+        for (int b = a; b < gdim; ++b, ++s) hessian(a, b) = hessian(b, a) = best_.hessian(s, j);
+      hessian = (metric_ * hessian * metric_).eval();
+      for (int a = 0, s = 0; a < gdim; ++a)
+        for (int b = a; b < gdim; ++b, ++s) row.hessian_weights[j * num_symmetric(gdim) + s] = hessian(a, b);
+    }
+  }
+
+  const CellGradients* cells_;
+  Schedule schedule_;
+  double accepted_sum_;
+  VertexRings rings_;
+  KrigingSystem system_;
+  double scale_ = 0;
+  SmallMatrix metric_;
+  std::vector<double> distances_;
+  std::vector<std::pair<double, Index>> candidates_;
+  std::vector<Index> patch_, previous_patch_, best_patch_;
+  Eigen::MatrixXd points_;
+  KrigingFit fit_, best_;
+  std::size_t best_entry_ = 0;
+};
+
+}  // namespace
+
+Kriging::Kriging(const KrigingOptions& options) : options_(options) {
+  if (options.drift == KrigingDrift::cubic && options.patch == KrigingPatch::lean)
+    raise("kriging: \"patch\": \"lean\" with \"drift\": \"cubic\": the cubic drift has one patch schedule; leave out \"patch\"");
+}
+
+Reconstruction Kriging::reconstruct(const CellGradients& cells, std::span<const Index> vertices) const {
+  Reconstruction result;
+  result.stencils = assemble_rows_with_workers(cells.gdim(), vertices, [&]() -> RowMaker {
+    // A std::function copies what it holds; the workspace stays in place.
+    return [row = std::make_shared<KrigingRow>(cells, options_)](Index vertex, StencilRow& out) { (*row)(vertex, out); };
+  });
+  return result;
+}
+
+}  // namespace halfgrad
