@@ -171,6 +171,7 @@ class KrigingRow {
     Eigen::Map<Eigen::MatrixXd>(row.weights.data(), best_.gradient.rows(), best_.gradient.cols()).noalias() =
         metric_ * best_.gradient;
     row.hessian_weights.resize(best_.hessian.size());
+    if (row.hessian_weights.empty()) return;
     for (Eigen::Index j = 0; j < best_.hessian.cols(); ++j) {
       SmallMatrix hessian(gdim, gdim);
       for (int a = 0, s = 0; a < gdim; ++a)
