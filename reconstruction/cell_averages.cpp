@@ -61,8 +61,7 @@ CellWeights consistent_weights(const std::vector<UsableCell>& usable, double eps
         "chandrashekar_garg: the weights of vertex {} are not determined with epsilon {} (least eigenvalue {:.3g}): "
         "use epsilon > 0",
         vertex, epsilon, eigen.values[0]);
-  const Vector lambda = -(eigen.vectors * eigen.values.cwiseInverse().asDiagonal() *
-                          eigen.vectors.transpose() * sum);
+  const Vector lambda = -(eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose() * sum);
   std::vector<double> raw;
   double total = 0, magnitude = 0;
   for (const UsableCell& cell : usable) {

@@ -111,7 +111,8 @@ class KrigingRow {
       const std::span<const Index> nodes = cells_->vertices_of(cell);
       for (std::size_t i = 0; i < nodes.size(); ++i)
         for (std::size_t j = 0; j < i; ++j, ++num_pairs) {
-          const Vector edge = (cells_->vertices().row(nodes[i]) - cells_->vertices().row(nodes[j])).transpose() / scale_;
+          const Vector edge =
+              (cells_->vertices().row(nodes[i]) - cells_->vertices().row(nodes[j])).transpose() / scale_;
           tensor += edge * edge.transpose();
         }
     }
@@ -201,14 +202,17 @@ class KrigingRow {
 
 Kriging::Kriging(const KrigingOptions& options) : options_(options) {
   if (options.drift == KrigingDrift::cubic && options.patch == KrigingPatch::lean)
-    raise("kriging: \"patch\": \"lean\" with \"drift\": \"cubic\": the cubic drift has one patch schedule; leave out \"patch\"");
+    raise(
+        "kriging: \"patch\": \"lean\" with \"drift\": \"cubic\": the cubic drift has one patch schedule; leave out "
+        "\"patch\"");
 }
 
 Reconstruction Kriging::reconstruct(const CellGradients& cells, std::span<const Index> vertices) const {
   Reconstruction result;
   result.stencils = assemble_rows_with_workers(cells.gdim(), vertices, [&]() -> RowMaker {
     // A std::function copies what it holds; the workspace stays in place.
-    return [row = std::make_shared<KrigingRow>(cells, options_)](Index vertex, StencilRow& out) { (*row)(vertex, out); };
+    return
+        [row = std::make_shared<KrigingRow>(cells, options_)](Index vertex, StencilRow& out) { (*row)(vertex, out); };
   });
   return result;
 }

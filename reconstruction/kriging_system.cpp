@@ -65,16 +65,15 @@ void fill_drift(const Eigen::Ref<const MatrixXd>& points, int degree, Eigen::Ref
     for (Eigen::Index b = a; b < dim; ++b)
       for (Eigen::Index c = b; c < dim; ++c) {
         const double multinomial = a == b && b == c ? 1 : (a == b || b == c ? 3 : 6);
-        drift.col(column++) =
-            std::sqrt(multinomial) / 6 *
-            points.row(a).cwiseProduct(points.row(b)).cwiseProduct(points.row(c)).transpose();
+        drift.col(column++) = std::sqrt(multinomial) / 6 *
+                              points.row(a).cwiseProduct(points.row(b)).cwiseProduct(points.row(c)).transpose();
       }
 }
 
 // One degree of the drift, fitted to what the degrees before it leave.
 struct Stage {
-  Block columns;  // its whitened drift columns, #rows × size
-  Block inverse;  // filtered pseudo-inverse of the columns' part outside the basis, size × #rows
+  Block columns;    // its whitened drift columns, #rows × size
+  Block inverse;    // filtered pseudo-inverse of the columns' part outside the basis, size × #rows
   Block operation;  // Z: from data to this degree's coefficients, size × #rows
 };
 
@@ -165,8 +164,8 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   stages.reserve(3);
   for (int degree = 1; degree <= degree_; ++degree) {
     const Eigen::Index size = degree == 1 ? dim : (degree == 2 ? num_quadratic : num_cubic(dim_));
-    stages.push_back({Block(whitened.col(first_column).data(), rows, size), arena.take(size, rows),
-                      arena.take(size, rows)});
+    stages.push_back(
+        {Block(whitened.col(first_column).data(), rows, size), arena.take(size, rows), arena.take(size, rows)});
     Block projected = arena.take(rows, size);
     const double smallest = fit_stage(stages.back(), degree > 1, basis, num_basis, projected);
     if (degree > 1) fit.smallest_singular_value = std::min(fit.smallest_singular_value, smallest);

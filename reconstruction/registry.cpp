@@ -19,7 +19,8 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
                          [](JsonReader&) -> std::unique_ptr<VertexGradientReconstructor> {
                            return std::make_unique<VolumeAverage>();
                          }},
-      ReconstructorEntry{"inverse_distance", "mean of the adjacent cells' gradients, weighted by 1 / distance to centroid",
+      ReconstructorEntry{"inverse_distance",
+                         "mean of the adjacent cells' gradients, weighted by 1 / distance to centroid",
                          [](JsonReader&) -> std::unique_ptr<VertexGradientReconstructor> {
                            return std::make_unique<InverseDistance>();
                          }},
