@@ -27,7 +27,7 @@ struct Pyramid {
   static Eigen::Matrix<double, 5, 3> nodes() {
     return (Eigen::Matrix<double, 5, 3>() << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0.5, 0.5, 1).finished();
   }
-  static Eigen::Vector3d center() { return {0.5, 0.5, 0.2}; }
+  static Eigen::Vector3d center() { return {0.5, 0.5, 0.25}; }
   static Eigen::Matrix<double, 5, 1> shape(const Eigen::Vector3d& xi) {
     const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2;
     // Any value of the rational term keeps Σβ = 1 and Σβ_i node_i = ξ; at the apex it is zero.

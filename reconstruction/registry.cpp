@@ -4,8 +4,10 @@
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
+#include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
 #include "reconstruction/kriging.hpp"
+#include "reconstruction/patch_recovery.hpp"
 
 namespace halfgrad {
 
@@ -36,6 +38,18 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
                            knn.epsilon = options.number("epsilon", knn.epsilon);
                            return std::make_unique<Knn>(knn);
                          }},
+      ReconstructorEntry{"spr", "linear fit of the cells' gradients at their centroids (Zienkiewicz and Zhu 1992)",
+                         [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
+                           SprOptions spr;
+                           spr.rings = static_cast<int>(options.integer("rings", spr.rings));
+                           return std::make_unique<Spr>(spr);
+                         }},
+      ReconstructorEntry{"ppr", "gradient of a quadratic fitted to the values around a vertex (Zhang and Naga 2005)",
+                         [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
+                           PprOptions ppr;
+                           ppr.rings = static_cast<int>(options.integer("rings", ppr.rings));
+                           return std::make_unique<Ppr>(ppr);
+                         }},
       ReconstructorEntry{"kriging", "vertex stencil, exact for quadratics (or cubics), Matern prior for the rest",
                          [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
                            KrigingOptions kriging;
@@ -45,6 +59,9 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
                              kriging.patch = KrigingPatch::lean;
                            return std::make_unique<Kriging>(kriging);
                          }},
+      ReconstructorEntry{
+          "adaptive", "blend of chandrashekar_garg and kriging, chosen by the data a vertex and frame",
+          [](JsonReader&) -> std::unique_ptr<VertexGradientReconstructor> { return std::make_unique<Adaptive>(); }},
   };
   return entries;
 }
