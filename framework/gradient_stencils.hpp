@@ -70,7 +70,9 @@ Values<Scalar> apply_stencils(const GradientStencilTable& table, const Values<Sc
 template <class Scalar>
 Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const Values<Scalar>& values);
 
-/// Gradients under a blend (reconstructor `adaptive`) for the first num_blended rows, #num_blended × (#columns · gdim).
+/// Gradients under a blend (reconstructor `adaptive`) for the first num_blended rows, #num_blended × (#columns · gdim):
+/// F = F_c + w (F_k − F_c), w = 1 / (1 + 2 (ρ(F_k) / ρ(F_c))⁶), with F_c the averaging and F_k the main table's
+/// gradient.
 template <class Scalar>
 Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Values<Scalar>& values);
 
