@@ -5,6 +5,7 @@
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "framework/mesh.hpp"
 
@@ -21,5 +22,9 @@ struct MeshSource {
 /// at `directory`. `resolved` receives the object with defaults. Throws Error that names the JSON pointer.
 MeshSource read_mesh_source(const nlohmann::json& specification, const std::string& pointer,
                             const std::filesystem::path& directory, std::uint64_t seed, nlohmann::json& resolved);
+
+/// A file name or a list of them under a key, relative to `directory`. Throws Error that names the pointer.
+std::vector<std::filesystem::path> read_paths(const nlohmann::json& value, const std::string& pointer,
+                                              const std::filesystem::path& directory);
 
 }  // namespace halfgrad

@@ -10,10 +10,10 @@
 
 namespace halfgrad {
 
-/// Points, with triangles where they are the vertices of a surface.
+/// Points, with faces where they are the vertices of a surface.
 struct PointCloud {
-  Points positions;                                                    ///< #points × gdim
-  Eigen::Matrix<Index, Eigen::Dynamic, 3, Eigen::RowMajor> triangles;  ///< #triangles × 3; none for plain points
+  Points positions;  ///< #points × gdim
+  IndexTable faces;  ///< polygons by point number; no rows for plain points
 };
 
 /// Makes the points for one level of a mesh.

@@ -81,9 +81,12 @@ struct ExperimentResult {
   bool all_expectations_hold() const;
 };
 
-/// Norms of the errors |a_i − b_i| over the three regions; rows of NaN in `measured` (points not found) do not count.
+/// Where a point is: in a cell without a vertex on the mesh boundary, in one with, or nowhere.
+enum class PointPlace : std::uint8_t { interior, boundary, nowhere };
+
+/// Norms of the errors |a_i − b_i| over the three regions; points that are nowhere do not count.
 std::array<RegionError, 3> region_errors(const Points& measured, const Points& truth,
-                                         const std::vector<char>& at_boundary);
+                                         std::span<const PointPlace> places);
 
 /// Least-squares slope of log(error) over log(h); none with fewer than two positive pairs of different h.
 std::optional<double> fitted_order(std::span<const double> h, std::span<const double> errors);
