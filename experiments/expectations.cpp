@@ -72,12 +72,9 @@ bool rule_agrees(const Expectation& expected, const Row& row) {
 int resolve(int which, int last) { return which < 0 ? last + 1 + which : which; }
 
 std::vector<double> measured_orders(const Expectation& expected, const std::vector<ResultOrder>& orders) {
-  int last_frame = 0;
-  for (const ResultOrder& order : orders) last_frame = std::max(last_frame, order.frame);
   std::vector<double> values;
   for (const ResultOrder& order : orders)
-    if (rule_agrees(expected, order) && order.region == expected.region && order.norm == expected.norm &&
-        (expected.every_frame || order.frame == resolve(expected.frame, last_frame)))
+    if (rule_agrees(expected, order) && order.region == expected.region && order.norm == expected.norm)
       values.push_back(order.slope);
   return values;
 }
@@ -120,7 +117,8 @@ std::vector<Expectation> read_expectations(const json& list, const std::string& 
     if (reader.has("interpolant")) expected.interpolant = reader.text("interpolant");
     if (reader.has("reconstructor")) expected.reconstructor = reader.text("reconstructor");
     if (const json* options = reader.find("options")) {
-      if (!options->is_object()) raise("{}: found {}, expected an object", reader.pointer_to("options"), options->dump());
+      if (!options->is_object())
+        raise("{}: found {}, expected an object", reader.pointer_to("options"), options->dump());
       expected.options = options->dump();
     }
     const std::string region = reader.choice("region", {region_names.begin(), region_names.end()}, "all");
@@ -154,11 +152,12 @@ std::vector<ResultExpectation> check_expectations(const std::vector<Expectation>
                                              ? measured_orders(expected, orders)
                                              : measured_rows(expected, kind.quantity, rows);
       if (values.empty())
-        raise("{}: {} matches no result; the configuration ran no such interpolant, reconstructor, region, level or "
-              "frame (orders need two levels, gains need \"linear\")",
-              expected.pointer, expected.text);
-      ResultExpectation result{expected.text, bound.key, bound.limit, values.front(),
-                               static_cast<int>(values.size()), true};
+        raise(
+            "{}: {} matches no result; the configuration ran no such interpolant, reconstructor, region, level or "
+            "frame (orders need two levels, gains need \"linear\")",
+            expected.pointer, expected.text);
+      ResultExpectation result{expected.text, bound.key, bound.limit, values.front(), static_cast<int>(values.size()),
+                               true};
       for (const double value : values) {
         const bool worse = kind.at_least ? !(value >= result.measured) : !(value <= result.measured);
         if (worse) result.measured = value;

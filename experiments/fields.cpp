@@ -48,10 +48,16 @@ class FormulaField final : public Field {
   Formula formula_;
 };
 
-template <class F3, class F2>
-std::unique_ptr<Field> field_of_dimension(int gdim, F3 f3, F2 f2) {
-  if (gdim == 3) return std::make_unique<FormulaField<F3, 3>>(std::move(f3));
-  return std::make_unique<FormulaField<F2, 2>>(std::move(f2));
+/// make.operator()<D>() for the dimension at hand.
+template <class Make>
+std::unique_ptr<Field> in_each_dimension(int gdim, Make&& make) {
+  if (gdim == 3) return make.template operator()<3>();
+  if (gdim == 2) return make.template operator()<2>();
+  return make.template operator()<1>();
+}
+
+void need_plane_or_space(const JsonReader& options, int gdim) {
+  if (gdim < 2) raise("{}: a field of the plane or space, but the mesh is a line", options.pointer());
 }
 
 /// An array of `length` numbers under a key, or the default.
@@ -70,7 +76,7 @@ std::vector<double> numbers(JsonReader& options, std::string_view key, std::vect
 template <int D>
 Tuple<double, D> center_of(JsonReader& options, std::vector<double> fallback = std::vector<double>(D, 0.0)) {
   const std::vector<double> center = numbers(options, "center", std::move(fallback));
-  Tuple<double, D> result;
+  Tuple<double, D> result{};
   std::copy(center.begin(), center.end(), result.begin());
   return result;
 }
@@ -108,7 +114,7 @@ std::unique_ptr<Field> make_affine_in(JsonReader& options, const FieldSetting& s
 }
 
 std::unique_ptr<Field> make_affine(JsonReader& options, const FieldSetting& setting) {
-  return setting.gdim == 3 ? make_affine_in<3>(options, setting) : make_affine_in<2>(options, setting);
+  return in_each_dimension(setting.gdim, [&]<int D>() { return make_affine_in<D>(options, setting); });
 }
 
 /// x = Σ over monomials of total degree ≤ n of coefficient · X^m, one polynomial a component.
@@ -143,7 +149,9 @@ std::unique_ptr<Field> make_polynomial_in(JsonReader& options, const FieldSettin
   // Graded order: all of degree 0, then 1, …; within a degree the first axis' power falls.
   for (int total = 0; total <= field.degree; ++total)
     for (int i = total; i >= 0; --i) {
-      if constexpr (D == 2) {
+      if constexpr (D == 1) {
+        if (i == total) field.powers.push_back({i});
+      } else if constexpr (D == 2) {
         field.powers.push_back({i, total - i});
       } else {
         for (int j = total - i; j >= 0; --j) field.powers.push_back({i, j, total - i - j});
@@ -160,7 +168,7 @@ std::unique_ptr<Field> make_polynomial_in(JsonReader& options, const FieldSettin
 }
 
 std::unique_ptr<Field> make_polynomial(JsonReader& options, const FieldSetting& setting) {
-  return setting.gdim == 3 ? make_polynomial_in<3>(options, setting) : make_polynomial_in<2>(options, setting);
+  return in_each_dimension(setting.gdim, [&]<int D>() { return make_polynomial_in<D>(options, setting); });
 }
 
 /// Twist about the third axis by `angle` a unit length, then bend of the third axis to a circle of radius `bend`.
@@ -194,6 +202,7 @@ struct Bend2 {
 };
 
 std::unique_ptr<Field> make_bend_twist(JsonReader& options, const FieldSetting& setting) {
+  need_plane_or_space(options, setting.gdim);
   const double bend = options.number("bend_radius", 1.2);
   if (!(bend > 0)) raise("{}: found {}, expected a positive length", options.pointer_to("bend_radius"), bend);
   if (setting.gdim == 2) return std::make_unique<FormulaField<Bend2, 2>>(Bend2{bend, center_of<2>(options)});
@@ -221,6 +230,7 @@ struct RadialTwist {
 };
 
 std::unique_ptr<Field> make_radial_twist(JsonReader& options, const FieldSetting& setting) {
+  need_plane_or_space(options, setting.gdim);
   const double angle = options.number("angle", 2.2);
   const double softening = options.number("softening", 0.1);
   if (!(softening > 0)) raise("{}: found {}, expected a positive length", options.pointer_to("softening"), softening);
@@ -250,7 +260,9 @@ struct Waves {
 std::unique_ptr<Field> make_waves(JsonReader& options, const FieldSetting& setting) {
   const double amplitude = options.number("amplitude", 0.1);
   const double wavenumber = options.number("wavenumber", 5);
-  return field_of_dimension(setting.gdim, Waves<3>{amplitude, wavenumber}, Waves<2>{amplitude, wavenumber});
+  return in_each_dimension(setting.gdim, [&]<int D>() -> std::unique_ptr<Field> {
+    return std::make_unique<FormulaField<Waves<D>, D>>(Waves<D>{amplitude, wavenumber});
+  });
 }
 
 /// De Goes & James 2017, Eq. 17, at Poisson's ratio ½, where 2b = a:
@@ -303,7 +315,7 @@ std::unique_ptr<Field> make_kelvinlet_in(JsonReader& options) {
 
 std::unique_ptr<Field> make_kelvinlet_pinch(JsonReader& options, const FieldSetting& setting) {
   // The kernel is that of three-dimensional elasticity; in the plane it would not be incompressible.
-  if (setting.gdim != 3) raise("{}: kelvinlet_pinch is a field of space; the mesh is plane", options.pointer());
+  if (setting.gdim != 3) raise("{}: a field of space, but the mesh has dimension {}", options.pointer(), setting.gdim);
   return make_kelvinlet_in<3>(options);
 }
 

@@ -1,5 +1,6 @@
 #include "experiments/lattice.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -42,6 +43,11 @@ void for_each_box(std::array<int, 3> n, int dim, Function&& f) {
   for (int k = 0; k < (dim == 3 ? n[2] : 1); ++k)
     for (int j = 0; j < n[1]; ++j)
       for (int i = 0; i < n[0]; ++i) f(i, j, k);
+}
+
+void segments(Builder& builder, std::array<int, 3> n) {
+  for (int i = 0; i <= n[0]; ++i) builder.add(double(i) / n[0], 0);
+  for (int i = 0; i < n[0]; ++i) builder.cells.push_back({i, i + 1});
 }
 
 void quadrilaterals(Builder& builder, std::array<int, 3> n) {
@@ -101,15 +107,9 @@ void equilateral_triangles(Builder& builder, std::array<int, 3> n) {
     const bool odd_above = j % 2 == 0;
     const std::vector<Index>& even = odd_above ? rows[j] : rows[j + 1];
     const std::vector<Index>& odd = odd_above ? rows[j + 1] : rows[j];
-    const auto add = [&](Index a, Index b, Index c) {
-      if (odd_above)
-        builder.cells.push_back({a, b, c});
-      else
-        builder.cells.push_back({a, c, b});
-    };
     for (int i = 0; i <= n[0]; ++i) {
-      add(even[i], odd[i + 1], odd[i]);
-      if (i < n[0]) add(even[i], even[i + 1], odd[i + 1]);
+      builder.cells.push_back({even[i], odd[i + 1], odd[i]});
+      if (i < n[0]) builder.cells.push_back({even[i], even[i + 1], odd[i + 1]});
     }
   }
 }
@@ -126,7 +126,6 @@ void kuhn_tetrahedra(Builder& builder, std::array<int, 3> n) {
         ++corner[axis];
         cell.push_back(at(corner[0], corner[1], corner[2]));
       }
-      if (p >= 3) std::swap(cell[2], cell[3]);  // odd permutations turn the orientation
       builder.cells.push_back(std::move(cell));
     }
   });
@@ -183,14 +182,8 @@ void bcc_tetrahedra(Builder& builder, std::array<int, 3> n) {
           for (int corner = 0; corner < 4; ++corner)
             builder.cells.push_back({square[corner], square[(corner + 1) % 4], center(next), center(box)});
         } else {
-          std::vector<Index> low{square[0], square[1], square[2], center(box)};
-          std::vector<Index> high{square[0], square[2], square[3], center(box)};
-          if (side == 1) {
-            std::swap(low[1], low[2]);
-            std::swap(high[1], high[2]);
-          }
-          builder.cells.push_back(std::move(low));
-          builder.cells.push_back(std::move(high));
+          builder.cells.push_back({square[0], square[1], square[2], center(box)});
+          builder.cells.push_back({square[0], square[2], square[3], center(box)});
         }
       }
     }
@@ -204,6 +197,7 @@ struct Pattern {
 };
 
 constexpr std::array patterns = {
+    Pattern{"segment", "", segments},
     Pattern{"triangle", "kuhn", kuhn_triangles},
     Pattern{"triangle", "union_jack", union_jack_triangles},
     Pattern{"triangle", "equilateral", equilateral_triangles},
@@ -283,6 +277,14 @@ Mesh make_lattice(const LatticeOptions& options) {
     block.cells.resize(static_cast<Eigen::Index>(builder.cells.size()), E::num_nodes);
     for (std::size_t c = 0; c < builder.cells.size(); ++c)
       for (int i = 0; i < E::num_nodes; ++i) block.cells(static_cast<Eigen::Index>(c), i) = builder.cells[c][i];
+    // The patterns list the nodes of simplices in any order.
+    if constexpr (E::affine)
+      for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
+        NodeMatrix<E> positions;
+        for (int i = 0; i < E::num_nodes; ++i) positions.row(i) = vertices.row(block.cells(c, i));
+        const auto jacobian = (positions.transpose() * E::shape_gradient(E::center())).eval();
+        if (jacobian.determinant() < 0) std::swap(block.cells(c, 0), block.cells(c, 1));
+      }
     blocks.push_back(std::move(block));
   });
   return Mesh(std::move(vertices), std::move(blocks));

@@ -101,7 +101,11 @@ std::vector<std::filesystem::path> read_paths(const json& value, const std::stri
   std::vector<std::filesystem::path> paths;
   for (const json& entry : list) {
     if (!entry.is_string()) raise("{}: found {}, expected a file name or a list of them", pointer, value.dump());
-    paths.push_back(directory / entry.get<std::string>());
+    const std::string name = entry.get<std::string>();
+    paths.push_back(directory / name);
+    const bool is_pattern = name.find_first_of("%*?#") != std::string::npos;
+    if (!is_pattern && !std::filesystem::exists(paths.back()))
+      raise("{}: {} does not exist", pointer, paths.back().string());
   }
   if (paths.empty()) raise("{}: found an empty list, expected a file name", pointer);
   return paths;

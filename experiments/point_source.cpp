@@ -150,7 +150,7 @@ Vector center_of(JsonReader& reader) {
 /// A surface is the same for all levels, and lives in space.
 PointSource surface(PointCloud cloud, const std::string& pointer) {
   return [cloud = std::move(cloud), pointer](const Mesh& mesh, int) {
-    if (mesh.gdim() != 3) raise("{}: a surface of space, but the mesh is plane", pointer);
+    if (mesh.gdim() != 3) raise("{}: a surface of space, but the mesh has dimension {}", pointer, mesh.gdim());
     return cloud;
   };
 }

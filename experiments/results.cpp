@@ -49,15 +49,17 @@ std::optional<double> fitted_order(std::span<const double> h, std::span<const do
 
 std::vector<ResultOrder> orders_of(const std::vector<ResultRow>& rows) {
   const auto key = [](const ResultRow& row) {
-    return std::tie(row.interpolant, row.alpha, row.reconstructor, row.options, row.frame);
+    return std::tie(row.interpolant, row.alpha, row.reconstructor, row.options);
   };
+  int last_frame = 0;
+  for (const ResultRow& row : rows) last_frame = std::max(last_frame, row.frame);
   std::vector<ResultOrder> orders;
   std::vector<char> done(rows.size(), 0);
   for (std::size_t first = 0; first < rows.size(); ++first) {
-    if (done[first]) continue;
+    if (done[first] || rows[first].frame != last_frame) continue;
     std::vector<const ResultRow*> levels;
     for (std::size_t other = first; other < rows.size(); ++other)
-      if (key(rows[other]) == key(rows[first])) {
+      if (rows[other].frame == last_frame && key(rows[other]) == key(rows[first])) {
         done[other] = 1;
         levels.push_back(&rows[other]);
       }
@@ -69,8 +71,8 @@ std::vector<ResultOrder> orders_of(const std::vector<ResultRow>& rows) {
           errors.push_back(row->error[static_cast<int>(region)][norm]);
         }
         if (const auto slope = fitted_order(h, errors))
-          orders.push_back({rows[first].interpolant, rows[first].alpha, rows[first].reconstructor, rows[first].options,
-                            rows[first].frame, region, norm, *slope});
+          orders.push_back(
+              {rows[first].interpolant, rows[first].reconstructor, rows[first].options, region, norm, *slope});
       }
     }
   }

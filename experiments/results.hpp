@@ -47,12 +47,10 @@ struct ResultRow {
   Index skipped_cells = 0, skipped_vertices = 0, linear_cells = 0, outside_points = 0;
 };
 
-/// Slope of log error over log h.
+/// Slope of log error over log h at the last frame.
 struct ResultOrder {
   std::string interpolant;
-  double alpha = 0;
   std::string reconstructor, options;
-  int frame = 0;
   Region region = Region::all;
   Norm norm = Norm::rms;
   double slope = 0;
@@ -91,7 +89,7 @@ std::array<RegionError, 3> region_errors(const Points& measured, const Points& t
 /// Least-squares slope of log(error) over log(h); none with fewer than two positive pairs of different h.
 std::optional<double> fitted_order(std::span<const double> h, std::span<const double> errors);
 
-/// The slopes of all rows that share everything but the level; none with fewer than two levels.
+/// The slopes of the last frame's rows that share everything but the level; none with fewer than two levels.
 std::vector<ResultOrder> orders_of(const std::vector<ResultRow>& rows);
 
 }  // namespace halfgrad
