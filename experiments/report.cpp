@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "experiments/experiment.hpp"
+#include "framework/error.hpp"
 #include "framework/io/output_file.hpp"
 #include "framework/io/vtk_output.hpp"
 

@@ -35,9 +35,9 @@ struct ResultRow {
   Index points = 0;
   int frame = 0;
   std::string interpolant;
-  double alpha = 0;           ///< of blends; 0 elsewhere
-  std::string reconstructor;  ///< empty where the interpolant needs none
-  std::string options;        ///< of the reconstructor, compact JSON
+  std::optional<double> alpha;  ///< of blends
+  std::string reconstructor;    ///< empty where the interpolant needs none
+  std::string options;          ///< of the reconstructor, compact JSON
   std::array<RegionError, 3> error;
   std::array<std::optional<double>, 3> gain_over_linear;      ///< none where linear was not run or has no error
   std::array<std::optional<double>, 3> max_gain_over_linear;  ///< the same in the max norm

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "experiments/experiment.hpp"
+#include "framework/error.hpp"
 
 namespace halfgrad {
 namespace {
