@@ -142,10 +142,10 @@ std::string element_names(const Mesh& mesh) {
 /// One level of one configuration.
 class LevelRun {
  public:
-  LevelRun(const ExperimentConfig& config, int level, const std::function<void(std::string_view, double)>& progress)
+  LevelRun(const ExperimentConfig& config, int level, std::function<void(std::string_view, double)> progress)
       : config_(config),
         level_(level),
-        progress_(progress),
+        progress_(std::move(progress)),
         mesh_(config.mesh.make(level)),
         cloud_(config.points(mesh_, level)) {}
 
@@ -286,7 +286,7 @@ class LevelRun {
 
   const ExperimentConfig& config_;
   int level_;
-  const std::function<void(std::string_view, double)>& progress_;
+  std::function<void(std::string_view, double)> progress_;
   Mesh mesh_;
   PointCloud cloud_;
   std::vector<PointPlace> places_;

@@ -1,5 +1,6 @@
 #include "experiments/point_source.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
