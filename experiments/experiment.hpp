@@ -12,11 +12,11 @@
 namespace halfgrad {
 
 struct RunOptions {
-  std::filesystem::path out_directory;  ///< for results.json and the other outputs; empty writes nothing
-  std::vector<std::string> overrides;   ///< "/json/pointer=VALUE", VALUE as JSON or, where it is none, as a string
-  bool reduced = false;                 ///< apply the configuration's "reduced" object first
-  bool check_only = false;              ///< read and validate; the result has a name and a config only
-  std::function<void(std::string_view stage, double fraction)> progress;  ///< called from the running thread
+  std::filesystem::path out_directory = {};  ///< for results.json and the other outputs; empty writes nothing
+  std::vector<std::string> overrides = {};   ///< "/json/pointer=VALUE", VALUE as JSON or, where it is none, as a string
+  bool reduced = false;                      ///< apply the configuration's "reduced" object first
+  bool check_only = false;                   ///< read and validate; the result has a name and a config only
+  std::function<void(std::string_view stage, double fraction)> progress = {};  ///< called from the running thread
 };
 
 /// Runs a configuration file. Throws Error on bad input, before any file is written.
