@@ -209,7 +209,7 @@ std::vector<std::string> config_names() {
 }
 
 INSTANTIATE_TEST_SUITE_P(Repository, Config, testing::ValuesIn(config_names()),
-                         [](const auto& info) { return info.param; });
+                         [](const auto& test) { return test.param; });
 
 }  // namespace
 }  // namespace halfgrad

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include <nlohmann/json.hpp>
 
@@ -54,7 +55,7 @@ TEST_P(AnyField, DerivativesAreThoseOfTheValue) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Registry, AnyField, testing::ValuesIn(all_cases()),
-                         [](const auto& info) { return info.param.name + "_" + std::to_string(info.param.gdim); });
+                         [](const auto& test) { return test.param.name + "_" + std::to_string(test.param.gdim); });
 
 TEST(KelvinletPinch, IsIncompressibleToFirstOrderAndInjective) {
   const auto field = make_field("kelvinlet_pinch", "/field", {3, 0});

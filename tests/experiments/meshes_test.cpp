@@ -1,6 +1,7 @@
 // Generated meshes and points are what they claim to be.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include <numbers>
 
