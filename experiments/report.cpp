@@ -10,6 +10,7 @@
 #include "framework/error.hpp"
 #include "framework/io/output_file.hpp"
 #include "framework/io/vtk_output.hpp"
+#include "framework/version.hpp"
 
 namespace halfgrad {
 
@@ -101,7 +102,7 @@ std::string results_json(const ExperimentResult& result) {
                             {"matches", expected.matches},
                             {"holds", expected.holds}});
   const json document = {{"name", result.name},
-                         {"version", HALFGRAD_VERSION},
+                         {"version", version},
                          {"config", json::parse(result.config)},
                          {"machine", json::parse(result.machine)},
                          {"rows", rows},
