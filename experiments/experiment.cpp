@@ -1,0 +1,334 @@
+#include "experiments/experiment.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "experiments/experiment_config.hpp"
+#include "experiments/report.hpp"
+#include "framework/error.hpp"
+#include "framework/io/frame_source.hpp"
+#include "reconstruction/cell_averages.hpp"
+
+namespace halfgrad {
+namespace {
+
+/// Runs `work` as often as asked and returns the median of its seconds; the last result stays.
+template <class Work>
+double median_seconds(int repetitions, Work&& work) {
+  std::vector<double> seconds(repetitions);
+  for (double& second : seconds) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    second = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  std::nth_element(seconds.begin(), seconds.begin() + repetitions / 2, seconds.end());
+  return seconds[repetitions / 2];
+}
+
+/// The deformed vertices and true points of a level, one frame at a time.
+class FrameSequence {
+ public:
+  FrameSequence(const ExperimentConfig& config, const Mesh& mesh, const Points& points, int level)
+      : config_(config), mesh_(mesh), points_(points) {
+    if (config.field) {
+      numbers_ = {0};
+      return;
+    }
+    frames_ = open_frames(config.files->frames[level].string());
+    truth_ = open_frames(config.files->truth.string());
+    if (frames_->num_vertices() != mesh.num_vertices())
+      raise("{}: frames of {} vertices, but the mesh has {}", config.files->frames[level].string(),
+            frames_->num_vertices(), mesh.num_vertices());
+    if (truth_->num_vertices() != points.rows())
+      raise("{}: {} true points, but there are {} points", config.files->truth.string(), truth_->num_vertices(),
+            points.rows());
+    if (truth_->num_frames() != frames_->num_frames() || truth_->num_columns() != frames_->num_columns())
+      raise("{}: {} frames of {} coordinates, but {} has {} of {}", config.files->truth.string(), truth_->num_frames(),
+            truth_->num_columns(), config.files->frames[level].string(), frames_->num_frames(), frames_->num_columns());
+    const int count = static_cast<int>(frames_->num_frames());
+    if (config.files->select.empty()) {
+      numbers_.resize(count);
+      std::iota(numbers_.begin(), numbers_.end(), 0);
+    }
+    for (const int number : config.files->select) {
+      numbers_.push_back(number < 0 ? count + number : number);
+      if (numbers_.back() < 0 || numbers_.back() >= count) raise("/field/select: frame {} of {} frames", number, count);
+    }
+  }
+
+  const std::vector<int>& numbers() const { return numbers_; }
+
+  void read(int frame, Points& values, Points& truth) {
+    if (config_.field) {
+      values = field_values(*config_.field, mesh_.vertices());
+      truth = field_values(*config_.field, points_);
+    } else {
+      frames_->read(frame, values);
+      truth_->read(frame, truth);
+    }
+  }
+
+ private:
+  const ExperimentConfig& config_;
+  const Mesh& mesh_;
+  const Points& points_;
+  std::unique_ptr<FrameSource> frames_, truth_;
+  std::vector<int> numbers_;
+};
+
+/// An interpolant bound with a reconstructor, and what bind tells of it.
+struct BoundRule {
+  Interpolant<double> interpolant;
+  bool is_exact = false;
+  ResultRow facts;  ///< what is the same for all frames
+};
+
+/// √mean (n w' − 1)² over the cells of all vertices: 0 for equal weights, large where weights are fitted to noise.
+std::optional<double> weight_spread(const VertexGradientReconstructor& reconstructor, const CellGradients& cells,
+                                    const std::vector<Index>& vertices) {
+  const auto* average = dynamic_cast<const CellAverage*>(&reconstructor);
+  if (average == nullptr) return std::nullopt;
+  double sum = 0;
+  std::size_t count = 0;
+  for (const Index vertex : vertices) {
+    const CellWeights weights = average->weights(cells, vertex);
+    const double n = static_cast<double>(weights.weights.size());
+    for (const double weight : weights.weights) sum += (n * weight - 1) * (n * weight - 1);
+    count += weights.weights.size();
+  }
+  if (count == 0) return std::nullopt;
+  return std::sqrt(sum / static_cast<double>(count));
+}
+
+double greatest_absolute_sum(const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix) {
+  double greatest = 0;
+  for (Eigen::Index row = 0; row < matrix.outerSize(); ++row) {
+    double sum = 0;
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(matrix, row); entry; ++entry)
+      sum += std::abs(entry.value());
+    greatest = std::max(greatest, sum);
+  }
+  return greatest;
+}
+
+/// Exact gradients and Hessians of a field at an interpolant's active vertices, in the layout of evaluate_given.
+void exact_derivatives(const Field& field, const Mesh& mesh, std::span<const Index> active, Points& gradients,
+                       Points& hessians) {
+  const int gdim = mesh.gdim(), symmetric = num_symmetric(gdim);
+  gradients.resize(static_cast<Eigen::Index>(active.size()), gdim * gdim);
+  hessians.resize(static_cast<Eigen::Index>(active.size()), gdim * symmetric);
+  for (std::size_t row = 0; row < active.size(); ++row) {
+    const FieldJet jet = field.jet(mesh.vertices().row(active[row]).transpose());
+    for (int c = 0; c < gdim; ++c) {
+      for (int a = 0; a < gdim; ++a) gradients(row, c * gdim + a) = jet.gradient(c, a);
+      for (int a = 0, s = 0; a < gdim; ++a)
+        for (int b = a; b < gdim; ++b, ++s) hessians(row, c * symmetric + s) = jet.hessian[c](a, b);
+    }
+  }
+}
+
+std::string element_names(const Mesh& mesh) {
+  std::string names;
+  for_each_block(mesh, [&]<Element E>(const ElementBlock<E>&, Index) {
+    if (!names.empty()) names += '+';
+    names += E::name;
+  });
+  return names;
+}
+
+/// One level of one configuration.
+class LevelRun {
+ public:
+  LevelRun(const ExperimentConfig& config, int level, std::function<void(std::string_view, double)> progress)
+      : config_(config),
+        level_(level),
+        progress_(std::move(progress)),
+        mesh_(config.mesh.make(level)),
+        cloud_(config.points(mesh_, level)) {}
+
+  std::vector<ResultRow> run(LevelPicture* picture) {
+    bind(picture);
+    FrameSequence frames(config_, mesh_, cloud_.positions, level_);
+    std::vector<ResultRow> rows;
+    Points values, truth;
+    const std::vector<int>& numbers = frames.numbers();
+    for (std::size_t f = 0; f < numbers.size(); ++f) {
+      progress_(fmt::format("level {}: frame {}", level_, numbers[f]), 0.5 + 0.5 * double(f) / double(numbers.size()));
+      frames.read(numbers[f], values, truth);
+      const std::size_t first = rows.size();
+      for (const BoundRule& rule : rules_) {
+        Points result;
+        rows.push_back(measure(rule, numbers[f], values, truth, result));
+        if (picture != nullptr && f + 1 == numbers.size())
+          picture->errors.emplace_back(rows.back(), (result - truth).rowwise().norm());
+      }
+      add_gains(rows, first);
+    }
+    if (picture != nullptr) {
+      picture->mesh = mesh_;
+      picture->cloud = cloud_;
+    }
+    return rows;
+  }
+
+ private:
+  void bind(LevelPicture* picture) {
+    progress_(fmt::format("level {}: locate {} points", level_, cloud_.positions.rows()), 0);
+    Embedding embedding;
+    ResultRow facts;
+    facts.level = level_;
+    facts.element = element_names(mesh_);
+    facts.vertices = mesh_.num_vertices();
+    facts.cells = mesh_.num_cells();
+    facts.h = mean_edge_length(mesh_);
+    facts.points = static_cast<Index>(cloud_.positions.rows());
+    facts.locate_seconds = median_seconds(
+        config_.repetitions, [&] { embedding = embed(mesh_, cloud_.positions, {.outside = config_.outside}); });
+    facts.outside_points = static_cast<Index>(embedding.outside.size());
+    place_points(embedding);
+    const std::vector<Index> active = active_vertices(mesh_, embedding);
+
+    for (const ConfiguredInterpolant& named : config_.interpolants)
+      if (!named.rule.needs_gradients()) add_rule(embedding, named, facts, nullptr, nullptr);
+    for (std::size_t r = 0; r < config_.reconstructors.size(); ++r) {
+      const MadeReconstructor& made = config_.reconstructors[r];
+      progress_(fmt::format("level {}: {}", level_, made.name),
+                0.1 + 0.4 * double(r) / double(config_.reconstructors.size()));
+      ResultRow own = facts;
+      own.reconstructor = made.name;
+      own.options = made.options;
+      Reconstruction reconstruction;
+      if (made.reconstructor) {
+        own.reconstruct_seconds = median_seconds(config_.repetitions, [&] {
+          const CellGradients cells(mesh_);
+          reconstruction = made.reconstructor->reconstruct(cells, active);
+        });
+        own.sigma = weight_spread(*made.reconstructor, CellGradients(mesh_), active);
+        if (picture != nullptr) picture->stencils.emplace_back(made.name, reconstruction.stencils);
+      }
+      for (const ConfiguredInterpolant& named : config_.interpolants) {
+        if (!named.rule.needs_gradients()) continue;
+        // Pairs that cannot be are left out, so that one list of each serves a whole table.
+        if (named.rule.needs_hessians() && made.reconstructor && !reconstruction.stencils.has_hessians()) continue;
+        add_rule(embedding, named, own, &made, &reconstruction);
+      }
+    }
+    if (rules_.empty()) raise("/interpolants: none of them can be combined with any of the reconstructors");
+  }
+
+  void add_rule(const Embedding& embedding, const ConfiguredInterpolant& named, ResultRow facts,
+                const MadeReconstructor* made, const Reconstruction* reconstruction) {
+    const bool is_exact = made != nullptr && !made->reconstructor;
+    BoundRule rule{{mesh_, embedding, named.rule, is_exact ? nullptr : reconstruction}, is_exact, std::move(facts)};
+    rule.facts.interpolant = named.name;
+    if (named.rule.formula == Formula::blend) rule.facts.alpha = named.rule.alpha;
+    const BindReport& report = rule.interpolant.report();
+    rule.facts.skipped_cells = report.num_cells - report.num_active_cells;
+    rule.facts.skipped_vertices = report.num_vertices - report.num_active_vertices;
+    if (!is_exact && (reconstruction == nullptr || !reconstruction->blend))
+      rule.facts.max_abs_sum = greatest_absolute_sum(rule.interpolant.matrix());
+    rules_.push_back(std::move(rule));
+  }
+
+  void place_points(const Embedding& embedding) {
+    const std::vector<char> boundary = boundary_vertices(mesh_);
+    places_.resize(embedding.cells.size());
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (embedding.cells[p] < 0) {
+        places_[p] = PointPlace::nowhere;
+        continue;
+      }
+      const auto vertices = mesh_.cell_vertices(embedding.cells[p]);
+      const bool touches = std::any_of(vertices.begin(), vertices.end(), [&](Index v) { return boundary[v] != 0; });
+      places_[p] = touches ? PointPlace::boundary : PointPlace::interior;
+    }
+  }
+
+  ResultRow measure(const BoundRule& rule, int frame, const Points& values, const Points& truth, Points& result) const {
+    ResultRow row = rule.facts;
+    row.frame = frame;
+    const Interpolant<double>& interpolant = rule.interpolant;
+    Points gradients, hessians;
+    if (rule.is_exact) {
+      exact_derivatives(*config_.field, mesh_, interpolant.active(), gradients, hessians);
+    } else if (interpolant.rule().needs_gradients()) {
+      row.gradients_seconds = median_seconds(config_.repetitions, [&] {
+        gradients = interpolant.vertex_gradients(values);
+        if (interpolant.rule().needs_hessians()) hessians = interpolant.vertex_hessians(values);
+      });
+    }
+    const EvaluateOptions options{.tolerance = config_.tolerance};
+    row.evaluate_seconds = median_seconds(
+        config_.repetitions, [&] { interpolant.evaluate_given(values, gradients, hessians, result, options); });
+    if (config_.tolerance > 0 && !rule.is_exact && interpolant.rule().needs_gradients())
+      row.linear_cells = interpolant.num_linear_cells(values, options);
+    row.error = region_errors(result, truth, places_);
+    return row;
+  }
+
+  static void add_gains(std::vector<ResultRow>& rows, std::size_t first) {
+    const auto linear = std::find_if(rows.begin() + static_cast<std::ptrdiff_t>(first), rows.end(),
+                                     [](const ResultRow& row) { return row.interpolant == "linear"; });
+    if (linear == rows.end()) return;
+    const std::array<RegionError, 3> reference = linear->error;
+    for (std::size_t r = first; r < rows.size(); ++r)
+      for (int region = 0; region < 3; ++region) {
+        const RegionError& error = rows[r].error[region];
+        if (reference[region].rms > 0 && error.rms > 0)
+          rows[r].gain_over_linear[region] = reference[region].rms / error.rms;
+        if (reference[region].max > 0 && error.max > 0)
+          rows[r].max_gain_over_linear[region] = reference[region].max / error.max;
+      }
+  }
+
+  const ExperimentConfig& config_;
+  int level_;
+  std::function<void(std::string_view, double)> progress_;
+  Mesh mesh_;
+  PointCloud cloud_;
+  std::vector<PointPlace> places_;
+  std::vector<BoundRule> rules_;
+};
+
+bool wants(const ExperimentConfig& config, OutputKind kind) {
+  return std::find(config.outputs.begin(), config.outputs.end(), kind) != config.outputs.end();
+}
+
+}  // namespace
+
+ExperimentResult run_experiment(const std::filesystem::path& path, const RunOptions& options) {
+  const ExperimentConfig config = read_experiment_config(path, options.overrides, options.reduced);
+  ExperimentResult result;
+  result.name = config.name;
+  result.config = config.resolved;
+  if (options.check_only) return result;
+
+  const int num_levels = config.mesh.num_levels;
+  LevelPicture picture;
+  for (int level = 0; level < num_levels; ++level) {
+    const auto progress = [&](std::string_view stage, double fraction) {
+      if (options.progress) options.progress(stage, (level + fraction) / num_levels);
+    };
+    const bool pictured = level == num_levels - 1 && wants(config, OutputKind::vtu);
+    LevelRun run(config, level, progress);
+    const std::vector<ResultRow> rows = run.run(pictured ? &picture : nullptr);
+    result.rows.insert(result.rows.end(), rows.begin(), rows.end());
+  }
+  result.machine = machine_facts();
+  result.orders = orders_of(result.rows);
+  result.expectations = check_expectations(config.expectations, result.rows, result.orders);
+  if (!options.out_directory.empty()) {
+    std::filesystem::create_directories(options.out_directory);
+    if (wants(config, OutputKind::vtu)) write_pictures(options.out_directory, picture, result.files);
+    if (wants(config, OutputKind::csv))
+      write_report(options.out_directory / "results.csv", results_csv(result), result.files);
+    if (wants(config, OutputKind::json))
+      write_report(options.out_directory / "results.json", results_json(result), result.files);
+  }
+  return result;
+}
+
+}  // namespace halfgrad

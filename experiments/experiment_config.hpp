@@ -1,0 +1,57 @@
+// A configuration, read and validated: everything that a run needs.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "experiments/expectations.hpp"
+#include "experiments/fields.hpp"
+#include "experiments/mesh_source.hpp"
+#include "experiments/point_source.hpp"
+#include "framework/embedding.hpp"
+#include "framework/interpolant.hpp"
+#include "reconstruction/registry.hpp"
+
+namespace halfgrad {
+
+/// A rule and the name it was configured by.
+struct ConfiguredInterpolant {
+  std::string name;
+  InterpolationRule rule;
+};
+
+/// Deformed vertices and true points from files.
+struct FrameFiles {
+  std::vector<std::filesystem::path> frames;  ///< one a level
+  std::filesystem::path truth;
+  std::vector<int> select;  ///< frame numbers, negative ones from the end; empty is all
+};
+
+enum class OutputKind : std::uint8_t { json, csv, vtu };
+
+struct ExperimentConfig {
+  std::string name;
+  std::uint64_t seed = 0;
+  MeshSource mesh;
+  PointSource points;
+  std::unique_ptr<Field> field;     ///< null where files give the frames
+  std::optional<FrameFiles> files;  ///< none where a field does
+  std::vector<ConfiguredInterpolant> interpolants;
+  std::vector<MadeReconstructor> reconstructors;  ///< `exact` has a null reconstructor
+  Outside outside = Outside::error;
+  double tolerance = 0;  ///< of evaluation, length units
+  int repetitions = 1;
+  std::vector<Expectation> expectations;
+  std::vector<OutputKind> outputs;
+  std::string resolved;  ///< JSON with every default filled in
+};
+
+/// Reads a configuration file. `overrides` are "/json/pointer=VALUE"; `reduced` applies the object of that name first.
+/// Throws Error that names the file and the JSON pointer.
+ExperimentConfig read_experiment_config(const std::filesystem::path& path, const std::vector<std::string>& overrides,
+                                        bool reduced);
+
+}  // namespace halfgrad

@@ -1,0 +1,71 @@
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "experiments/experiment.hpp"
+#include "framework/error.hpp"
+
+namespace halfgrad {
+namespace {
+
+/// "phong + kriging (drift quadratic, patch wide)".
+std::string rule_name(const std::string& interpolant, const std::string& reconstructor, const std::string& options) {
+  if (reconstructor.empty()) return interpolant;
+  std::string name = interpolant + " + " + reconstructor;
+  const nlohmann::json object = nlohmann::json::parse(options.empty() ? "{}" : options);
+  std::string details;
+  for (const auto& [key, value] : object.items())
+    details += fmt::format("{}{} {}", details.empty() ? "" : ", ", key,
+                           value.is_string() ? value.get<std::string>() : value.dump());
+  return details.empty() ? name : name + " (" + details + ")";
+}
+
+std::string gain_text(const std::optional<double>& gain) { return gain ? fmt::format("{:.3g}", *gain) : "-"; }
+
+}  // namespace
+
+std::string summary_table(const ExperimentResult& result) {
+  if (result.rows.empty()) return {};
+  const ResultRow& last = result.rows.back();
+  std::string text = fmt::format("{}: {} vertices, {} cells ({}), h {:.4g}, {} points", result.name, last.vertices,
+                                 last.cells, last.element, last.h, last.points);
+  if (last.frame > 0) text += fmt::format(", frame {}", last.frame);
+  text += '\n';
+
+  // The last level and frame, a line a rule; slopes beside the errors where there are several levels.
+  std::size_t width = 12;
+  for (const ResultRow& row : result.rows)
+    width = std::max(width, rule_name(row.interpolant, row.reconstructor, row.options).size());
+  text += fmt::format("  {:<{}}  {:>10} {:>10}  {:>9} {:>9}", "rule", width, "rms inside", "boundary", "gain in.",
+                      "gain bnd.");
+  text += result.orders.empty() ? "\n" : fmt::format("  {:>9} {:>9}\n", "order in.", "order bnd.");
+  for (const ResultRow& row : result.rows) {
+    if (row.level != last.level || row.frame != last.frame) continue;
+    const auto rms = [&](Region region) {
+      const RegionError& error = row.error[static_cast<int>(region)];
+      return error.points > 0 ? fmt::format("{:.3e}", error.rms) : std::string("-");
+    };
+    text += fmt::format("  {:<{}}  {:>10} {:>10}  {:>9} {:>9}",
+                        rule_name(row.interpolant, row.reconstructor, row.options), width, rms(Region::interior),
+                        rms(Region::boundary), gain_text(row.gain_over_linear[1]), gain_text(row.gain_over_linear[2]));
+    if (!result.orders.empty()) {
+      for (const Region region : {Region::interior, Region::boundary}) {
+        const auto order = std::find_if(result.orders.begin(), result.orders.end(), [&](const ResultOrder& entry) {
+          return entry.interpolant == row.interpolant && entry.reconstructor == row.reconstructor &&
+                 entry.options == row.options && entry.region == region && entry.norm == Norm::rms;
+        });
+        text += order == result.orders.end() ? fmt::format(" {:>9}", "-") : fmt::format(" {:>9.2f}", order->slope);
+      }
+    }
+    text += '\n';
+  }
+  const auto held = std::count_if(result.expectations.begin(), result.expectations.end(),
+                                  [](const ResultExpectation& expected) { return expected.holds; });
+  if (!result.expectations.empty()) text += fmt::format("expect: {} of {} hold\n", held, result.expectations.size());
+  for (const ResultExpectation& expected : result.expectations)
+    if (!expected.holds)
+      text += fmt::format("  does not hold: {}: {} {:.4g}, measured {:.4g}\n", expected.text, expected.bound,
+                          expected.limit, expected.measured);
+  return text;
+}
+
+}  // namespace halfgrad
