@@ -1,0 +1,183 @@
+// The halfgrad program.
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+
+#include "apps/deform.hpp"
+#include "apps/listings.hpp"
+#include "experiments/experiment.hpp"
+#include "framework/error.hpp"
+#include "framework/version.hpp"
+
+namespace {
+
+using namespace halfgrad;
+using namespace halfgrad::app;
+
+enum ExitStatus { all_well = 0, internal_failure = 1, bad_input = 2, expectation_failed = 3 };
+
+constexpr const char* first_words =
+    "halfgrad carries detailed points through the deformation of a coarse mesh.\n"
+    "\n"
+    "  halfgrad deform --rest mesh.msh --frames frames.npy --points surface.obj --out out.npy\n"
+    "      carry points through a sequence\n"
+    "  halfgrad run configs/quickstart.json --out out/quickstart\n"
+    "      run an experiment: errors, orders and run times of interpolants and reconstructors\n"
+    "  halfgrad info mesh.msh\n"
+    "      what is in a mesh\n"
+    "\n"
+    "halfgrad --help lists all commands; halfgrad COMMAND --help explains one.\n";
+
+struct RunCommand {
+  std::filesystem::path config, out = "results";
+  std::vector<std::string> overrides;
+  bool reduced = false, check_only = false;
+};
+
+int run(const RunCommand& command, ProgressMode mode, bool quiet) {
+  std::unique_ptr<Progress> line;
+  constexpr std::int64_t steps = 1000;
+  RunOptions options;
+  options.out_directory = command.check_only ? std::filesystem::path() : command.out;
+  options.overrides = command.overrides;
+  options.reduced = command.reduced;
+  options.check_only = command.check_only;
+  line = std::make_unique<Progress>(quiet ? ProgressMode::never : mode, "run", steps, "steps of a thousand");
+  options.progress = [&](std::string_view, double fraction) {
+    line->advance(static_cast<std::int64_t>(fraction * steps));
+  };
+  const ExperimentResult result = run_experiment(command.config, options);
+  line.reset();
+  if (command.check_only) {
+    if (!quiet) fmt::print("{}: a valid configuration ({})\n", command.config.string(), result.name);
+    return all_well;
+  }
+  if (!quiet) {
+    fmt::print("{}", summary_table(result));
+    for (const std::string& file : result.files) fmt::print("written: {}\n", file);
+  }
+  if (result.all_expectations_hold()) return all_well;
+  fmt::print(stderr, "halfgrad: an expectation of {} does not hold\n", command.config.string());
+  return expectation_failed;
+}
+
+int dispatch(int argc, char** argv) {
+  CLI::App program("Carries detailed points through the deformation of a coarse mesh.", "halfgrad");
+  program.set_version_flag("--version", std::string("halfgrad ") + version);
+  program.require_subcommand(0, 1);
+  program.fallthrough();
+  int threads = 0;
+  bool quiet = false, progress = false;
+  program.add_option("--threads", threads, "Number of threads (default: all cores)")->check(CLI::Range(1, 4096));
+  program.add_flag("--quiet", quiet, "Print errors only");
+  program.add_flag("--progress", progress, "Show progress even where stderr is no terminal");
+
+  RunCommand command;
+  CLI::App* run_app = program.add_subcommand("run", "Run an experiment and write results.json");
+  run_app->add_option("config", command.config, "Configuration, JSON")->required();
+  run_app->add_option("--out", command.out, "Folder for the results")->capture_default_str();
+  run_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")->take_all();
+  run_app->add_flag("--reduced", command.reduced, "Apply the configuration's \"reduced\" object: the quick version");
+  run_app->footer("Example: halfgrad run configs/quickstart.json --out out/quickstart --set /seed=3");
+
+  CLI::App* check_app = program.add_subcommand("check", "Validate a configuration only");
+  check_app->add_option("config", command.config, "Configuration, JSON")->required();
+  check_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")->take_all();
+  check_app->footer("Example: halfgrad check configs/quickstart.json");
+
+  DeformOptions options;
+  CLI::App* deform_app = program.add_subcommand("deform", "Carry points through a sequence");
+  deform_app->add_option("--rest", options.rest, "Rest mesh: .msh .vtk .vtu .mesh .node/.ele")->required();
+  deform_app
+      ->add_option("--frames", options.frames,
+                   "Deformed vertices: .npy .pc2 .pvd, or a pattern of files (x.%04d.vtu, frames/*.vtu)")
+      ->required();
+  deform_app->add_option("--points", options.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy")->required();
+  deform_app->add_option("--out", options.out, "Output: .npy .pc2 .obj (name.%04d.obj) .pvd")->required();
+  CLI::Option* interpolant =
+      deform_app->add_option("--interpolant", options.interpolant, "See halfgrad list interpolants")
+          ->capture_default_str();
+  deform_app->add_option("--alpha", options.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
+  deform_app->add_option("--reconstructor", options.reconstructor, "A name or JSON; see halfgrad list reconstructors")
+      ->capture_default_str();
+  deform_app->add_option("--outside", options.outside, "Points outside the mesh: error, nearest or mark")
+      ->capture_default_str();
+  deform_app
+      ->add_option("--tolerance", options.tolerance,
+                   "Length: cells that differ from linear by less are evaluated linearly")
+      ->capture_default_str();
+  deform_app->add_flag("--normals", options.normals, "Also carry the surface's normals");
+  deform_app->add_flag("--gradients", options.gradients, "Also write deformation gradients at the points");
+  deform_app->add_option("--precision", options.precision, "float or double")->capture_default_str();
+  deform_app->add_option("--first", options.first, "First frame, from 0")->capture_default_str();
+  deform_app->add_option("--last", options.last, "Last frame (default: the last one)")->check(CLI::NonNegativeNumber);
+  deform_app->add_option("--step", options.step, "Take every step-th frame")->capture_default_str();
+  deform_app->add_option("--report", options.report, "Write times, counts and points outside as JSON");
+  deform_app->footer(
+      "Example: halfgrad deform --rest cage.msh --frames sim.npy --points render.obj --out render.pc2 --precision "
+      "float");
+
+  std::string what;
+  bool as_json = false;
+  CLI::App* list_app = program.add_subcommand("list", "List elements, reconstructors, interpolants, fields");
+  list_app->add_option("what", what, "elements, reconstructors, interpolants or fields (default: all)");
+  list_app->add_flag("--json", as_json, "Print JSON");
+  list_app->footer("Example: halfgrad list reconstructors");
+
+  std::filesystem::path mesh;
+  CLI::App* info_app = program.add_subcommand("info", "Counts, bounds, quality and faults of a mesh");
+  info_app->add_option("mesh", mesh, "Mesh file")->required();
+  info_app->add_flag("--json", as_json, "Print JSON");
+  info_app->footer("Example: halfgrad info cage.msh");
+
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return program.exit(error) == 0 ? all_well : bad_input;
+  }
+  std::unique_ptr<tbb::global_control> limit;
+  if (threads > 0)
+    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                  static_cast<std::size_t>(threads));
+  const ProgressMode mode = progress ? ProgressMode::always : ProgressMode::terminal;
+  if (run_app->parsed()) return run(command, mode, quiet);
+  if (check_app->parsed()) {
+    command.check_only = true;
+    return run(command, mode, quiet);
+  }
+  if (deform_app->parsed()) {
+    if (options.alpha && interpolant->count() == 0) options.interpolant = "vertex_blend";
+    options.progress = mode;
+    options.quiet = quiet;
+    deform(options);
+    return all_well;
+  }
+  if (list_app->parsed()) {
+    list(what, as_json);
+    return all_well;
+  }
+  if (info_app->parsed()) {
+    info(mesh, as_json);
+    return all_well;
+  }
+  fmt::print("{}", first_words);
+  return all_well;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return dispatch(argc, argv);
+  } catch (const halfgrad::Error& error) {
+    fmt::print(stderr, "halfgrad: {}\n", error.what());
+    return bad_input;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "halfgrad: internal failure: {}\n", error.what());
+    return internal_failure;
+  }
+}
