@@ -35,7 +35,7 @@ using NodeMatrix = Eigen::Matrix<double, E::num_nodes, E::dim>;
 ///
 /// member               meaning
 /// name                 the name used in JSON and reports, singular ("tetrahedron")
-/// vtk_id               the VTK cell type; node order is VTK's
+/// vtk_id               the VTK cell type; node order is VTK's but for the wedge, and makes det ∂x/∂ξ positive
 /// dim                  dimension of the reference cell
 /// num_nodes            number of nodes, which are the cell's corners
 /// affine               true where x(ξ) is affine for any node positions (simplices)

@@ -10,7 +10,8 @@
 
 namespace halfgrad {
 
-/// The triangular prism: a triangle's barycentric coordinates times a segment's.
+/// The triangular prism: a triangle's barycentric coordinates times a segment's. VTK lists both triangles the other way
+/// round (0 2 1, 3 5 4), which would turn the cell inside out; the code of its files converts.
 struct Wedge {
   static constexpr std::string_view name = "wedge";
   static constexpr int vtk_id = 13;

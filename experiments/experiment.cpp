@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "experiments/experiment_config.hpp"
+#include "experiments/html_report.hpp"
 #include "experiments/report.hpp"
 #include "framework/error.hpp"
 #include "framework/io/frame_source.hpp"
@@ -325,6 +326,8 @@ ExperimentResult run_experiment(const std::filesystem::path& path, const RunOpti
     if (wants(config, OutputKind::vtu)) write_pictures(options.out_directory, picture, result.files);
     if (wants(config, OutputKind::csv))
       write_report(options.out_directory / "results.csv", results_csv(result), result.files);
+    if (wants(config, OutputKind::html))
+      write_report(options.out_directory / "report.html", results_html(result), result.files);
     if (wants(config, OutputKind::json))
       write_report(options.out_directory / "results.json", results_json(result), result.files);
   }

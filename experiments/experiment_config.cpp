@@ -101,7 +101,7 @@ FrameFiles read_frame_files(const json& specification, const std::string& pointe
 }
 
 std::vector<OutputKind> read_outputs(JsonReader& reader) {
-  constexpr std::array<std::string_view, 3> known = {"json", "csv", "vtu"};
+  constexpr std::array<std::string_view, 4> known = {"json", "csv", "html", "vtu"};
   std::vector<OutputKind> outputs;
   const std::vector<json> list = read_list(reader, "outputs", json::array({"json", "csv"}));
   for (std::size_t i = 0; i < list.size(); ++i) {

@@ -30,7 +30,7 @@ struct FrameFiles {
   std::vector<int> select;  ///< frame numbers, negative ones from the end; empty is all
 };
 
-enum class OutputKind : std::uint8_t { json, csv, vtu };
+enum class OutputKind : std::uint8_t { json, csv, html, vtu };
 
 struct ExperimentConfig {
   std::string name;

@@ -1,7 +1,10 @@
 #include "experiments/results.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <tuple>
 
 namespace halfgrad {
@@ -77,6 +80,17 @@ std::vector<ResultOrder> orders_of(const std::vector<ResultRow>& rows) {
     }
   }
   return orders;
+}
+
+std::string rule_name(const std::string& interpolant, const std::string& reconstructor, const std::string& options) {
+  if (reconstructor.empty()) return interpolant;
+  std::string name = interpolant + " + " + reconstructor;
+  const nlohmann::json object = nlohmann::json::parse(options.empty() ? "{}" : options);
+  std::string details;
+  for (const auto& [key, value] : object.items())
+    details += fmt::format("{}{} {}", details.empty() ? "" : ", ", key,
+                           value.is_string() ? value.get<std::string>() : value.dump());
+  return details.empty() ? name : name + " (" + details + ")";
 }
 
 }  // namespace halfgrad

@@ -47,6 +47,9 @@ struct ResultRow {
   Index skipped_cells = 0, skipped_vertices = 0, linear_cells = 0, outside_points = 0;
 };
 
+/// "phong + kriging (drift quadratic, patch wide)"; options is a compact JSON object or empty.
+std::string rule_name(const std::string& interpolant, const std::string& reconstructor, const std::string& options);
+
 /// Slope of log error over log h at the last frame.
 struct ResultOrder {
   std::string interpolant;

@@ -1,23 +1,10 @@
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "experiments/experiment.hpp"
 #include "framework/error.hpp"
 
 namespace halfgrad {
 namespace {
-
-/// "phong + kriging (drift quadratic, patch wide)".
-std::string rule_name(const std::string& interpolant, const std::string& reconstructor, const std::string& options) {
-  if (reconstructor.empty()) return interpolant;
-  std::string name = interpolant + " + " + reconstructor;
-  const nlohmann::json object = nlohmann::json::parse(options.empty() ? "{}" : options);
-  std::string details;
-  for (const auto& [key, value] : object.items())
-    details += fmt::format("{}{} {}", details.empty() ? "" : ", ", key,
-                           value.is_string() ? value.get<std::string>() : value.dump());
-  return details.empty() ? name : name + " (" + details + ")";
-}
 
 std::string gain_text(const std::optional<double>& gain) { return gain ? fmt::format("{:.3g}", *gain) : "-"; }
 

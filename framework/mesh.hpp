@@ -11,7 +11,7 @@
 
 namespace halfgrad {
 
-/// Cells of one element type; node order is VTK's.
+/// Cells of one element type, in the element's node order.
 template <Element E>
 struct ElementBlock {
   using element = E;

@@ -171,7 +171,7 @@ TEST_F(Run, RefusesMistakesByPointerAndSuggestion) {
   EXPECT_THAT(refusal(R"({"points": {"random": {"count": -1}}})"), HasSubstr("/points/random/count"));
   EXPECT_THAT(refusal(R"({"interpolants": ["phnog"]})"), HasSubstr("did you mean \"phong\""));
   EXPECT_THAT(refusal(R"({"reconstructors": [{"knn": {"kk": 3}}]})"), HasSubstr("/reconstructors/0/knn/kk"));
-  EXPECT_THAT(refusal(R"({"outputs": ["html"]})"), AllOf(HasSubstr("/outputs/0"), HasSubstr("json, csv, vtu")));
+  EXPECT_THAT(refusal(R"({"outputs": ["htm"]})"), AllOf(HasSubstr("/outputs/0"), HasSubstr("json, csv, html, vtu")));
   EXPECT_THAT(refusal(R"({"mesh": {"lattice": null, "file": "none.msh"}})"), HasSubstr("does not exist"));
   EXPECT_THAT(refusal(R"({"mesh": {"file": "none.msh"}})"), HasSubstr("/mesh"));
   EXPECT_THAT(refusal(R"({"timing": {"repetitions": 0}})"), HasSubstr("/timing/repetitions"));
