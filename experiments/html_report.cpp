@@ -16,7 +16,7 @@ namespace halfgrad {
 namespace {
 
 constexpr const char* style_sheet = R"(
-body { font: 15px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff; max-width: 1000px; margin: 2em auto; padding: 0 1em; }
+body { font: 15px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff; max-width: 1180px; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.6em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2em; }
 p.facts { color: #555; margin-top: .3em; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
@@ -156,7 +156,7 @@ std::string pareto_chart(const std::vector<const ResultRow*>& rows, const Styles
       rows, styles, [](const ResultRow& row) { return 1e3 * frame_seconds(row); },
       [](const ResultRow& row) { return rms(row, Region::all); });
   for (ChartSeries& series : chart.series) series.connected = false;
-  chart.title = "Run time against error, all levels; the line joins what nothing beats";
+  chart.title = "Run time against error (line: nothing is better in both)";
   chart.x_label = "ms a frame (gradients and points)";
   chart.y_label = "rms error";
   std::vector<std::pair<double, double>> front;
@@ -164,7 +164,7 @@ std::string pareto_chart(const std::vector<const ResultRow*>& rows, const Styles
     if (row->reconstructor != "exact") front.emplace_back(1e3 * frame_seconds(*row), rms(*row, Region::all));
   std::sort(front.begin(), front.end());
   constexpr int black = 6;
-  ChartSeries line{.name = "Pareto front", .x = {}, .y = {}, .notes = {}, .style = black};
+  ChartSeries line{.name = "Pareto front", .x = {}, .y = {}, .notes = {}, .style = black, .has_markers = false};
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [seconds, error] : front)
     if (error < least) {

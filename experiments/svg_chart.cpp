@@ -15,7 +15,7 @@ namespace {
 constexpr std::array colours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"};
 constexpr int num_markers = 4;
 
-constexpr double width = 460, height = 330, left = 62, right = 12, top = 30, bottom = 44;
+constexpr double width = 460, height = 330, left = 74, right = 12, top = 30, bottom = 44;
 
 std::string marker(double x, double y, int style, const std::string& note) {
   const char* colour = colours[static_cast<std::size_t>(style) % colours.size()];
@@ -62,12 +62,15 @@ class Axis {
   std::vector<double> ticks() const {
     std::vector<double> ticks;
     if (logarithmic_) {
-      // Powers of ten; within fewer than two decades also 2 and 5 times them.
-      const bool fine = high_ - low_ < 2;
-      const int step = std::max(1, static_cast<int>((high_ - low_) / 7));
+      // Powers of ten; multiples of them where there are few.
+      const double decades = high_ - low_;
+      const std::vector<double> factors = decades < 0.7 ? std::vector<double>{1, 1.5, 2, 3, 4, 5, 6, 8}
+                                          : decades < 2 ? std::vector<double>{1, 2, 5}
+                                                        : std::vector<double>{1};
+      const int step = std::max(1, static_cast<int>(decades / 7));
       for (int e = static_cast<int>(std::floor(low_)); e <= static_cast<int>(std::ceil(high_)); e += step)
-        for (const double factor : {1.0, 2.0, 5.0})
-          if ((factor == 1 || fine) && inside(factor * std::pow(10, e))) ticks.push_back(factor * std::pow(10, e));
+        for (const double factor : factors)
+          if (const double tick = factor * std::pow(10, e); inside(tick)) ticks.push_back(tick);
       return ticks;
     }
     const double raw = (high_ - low_) / 5, power = std::pow(10, std::floor(std::log10(raw)));
@@ -148,7 +151,7 @@ std::string svg_chart(const Chart& chart) {
                      height - top - bottom);
   svg += fmt::format("<text x='{}' y='{}' text-anchor='middle'>{}</text>", (left + width - right) / 2, height - 8,
                      escaped(chart.x_label));
-  svg += fmt::format("<text transform='translate(14 {}) rotate(-90)' text-anchor='middle'>{}</text>",
+  svg += fmt::format("<text transform='translate(12 {}) rotate(-90)' text-anchor='middle'>{}</text>",
                      (top + height - bottom) / 2, escaped(chart.y_label));
 
   // Guides start at the lower right, where errors of fine meshes rarely are.
@@ -168,7 +171,7 @@ std::string svg_chart(const Chart& chart) {
       const double px = x.pixel(series.x[i]), py = y.pixel(series.y[i]);
       path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : " L", px, py);
       const std::string note = i < series.notes.size() ? series.notes[i] : series.name;
-      markers += marker(px, py, series.style, note);
+      if (series.has_markers) markers += marker(px, py, series.style, note);
     }
     if (series.connected && !path.empty())
       svg += fmt::format("<path d='{}' fill='none' stroke='{}' stroke-width='1.6'{}/>", path, colour,

@@ -13,6 +13,7 @@ struct ChartSeries {
   std::vector<std::string> notes;  ///< a text a point, shown on hovering; may be empty
   int style = 0;                   ///< colour and marker; equal styles look equal in all charts
   bool connected = true;           ///< a line through the points
+  bool has_markers = true;         ///< a marker at each point
 };
 
 struct Chart {
