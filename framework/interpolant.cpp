@@ -216,7 +216,7 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
   const FastRule fast = fast_rule(rule);
   const auto is_fast = [&]<class E>(const Runs<E>&) {
     return E::affine && options.kernel == Kernel::fast && values.cols() >= 1 &&
-           values.cols() <= kernels::max_fast_columns && kernels::polynomial_degree(fast.recipe) <= 2;
+           values.cols() <= kernels::max_fast_columns;
   };
   bool any_fast = false, any_plain = false;
   for (const AnyRuns& any : blocks)

@@ -5,7 +5,8 @@
 //
 //   positions  [vertex]            | x . . . |                          active vertices first, then those that stencils
 //   read lines      [active vertex]     | x . . . | H e_1 . | … | H e_d . | (Q_11 . | Q_12 . | …) |
-//              H = scale · F; one cache line for d = 3 in float
+//              H = scale · F, Q likewise; one cache line for d = 3 in
+//              float without Q
 //   stencils   [entry]             weights g_1 … g_d (q_11, q_12, …) of x_j − x_v; neighbors j
 //   nodes      [run][node]         number of the vertex; a run is the points of one cell
 //   rest       [run][node][axis]   X_i − X_0
