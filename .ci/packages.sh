@@ -1,8 +1,8 @@
 # The Debian 12 packages halfgrad needs, in one place, and the function that installs those that are missing.
 # Sourced by quickstart, run-tests and .ci/run.
 
-build_packages=(g++ cmake ninja-build libeigen3-dev libfmt-dev nlohmann-json3-dev libtbb-dev libfast-float-dev
-  libpugixml-dev zlib1g-dev libcli11-dev)
+build_packages=(g++ cmake ninja-build libeigen3-dev libfmt-dev nlohmann-json3-dev libtbb-dev libhwy-dev
+  libfast-float-dev libpugixml-dev zlib1g-dev libcli11-dev)
 test_packages=(libgtest-dev libgmock-dev)
 check_packages=(clang-format)
 

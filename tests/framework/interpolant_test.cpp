@@ -326,8 +326,9 @@ TYPED_TEST(InterpolantOn, ColumnsAreIndependent) {
   for (int c = 0; c < 5; ++c)
     values.col(c) = at_points(this->mesh.vertices(), power_field(TypeParam::dim, c).value).col(0);
   const Values<double> together = interpolant.evaluate(values);
+  // One column goes the fast path where there is one, five the plain path.
   for (int c = 0; c < 5; ++c)
-    EXPECT_LT(largest(interpolant.evaluate(Values<double>(values.col(c))) - Values<double>(together.col(c))), 1e-15);
+    EXPECT_LT(largest(interpolant.evaluate(Values<double>(values.col(c))) - Values<double>(together.col(c))), 1e-14);
 }
 
 TYPED_TEST(InterpolantOn, ToleranceKeepsItsBound) {

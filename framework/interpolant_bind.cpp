@@ -1,0 +1,287 @@
+// Bind: points sorted by cell, cells along a curve, vertices by first use, stencils in that numbering.
+#include <numeric>
+
+#include "framework/interpolant_binding.hpp"
+
+namespace halfgrad {
+
+namespace {
+
+// Interleaves the bits of quantised coordinates: cells near in space get near numbers.
+std::uint64_t morton_code(const Vector& unit) {
+  const int gdim = static_cast<int>(unit.size());
+  const int bits = std::min(21, 63 / gdim);
+  std::uint64_t code = 0;
+  std::array<std::uint64_t, 8> coordinate{};
+  for (int k = 0; k < gdim; ++k)
+    coordinate[k] = static_cast<std::uint64_t>(std::clamp(unit[k], 0.0, 1.0) * static_cast<double>((1ull << bits) - 1));
+  for (int b = bits - 1; b >= 0; --b)
+    for (int k = 0; k < gdim; ++k) code = (code << 1) | ((coordinate[k] >> b) & 1);
+  return code;
+}
+
+// The cells that hold points, sorted along a space-filling curve, and the points of each in ascending order.
+struct CellOrder {
+  std::vector<Index> cells;
+  std::vector<Index> first_point;  // #cells + 1, into points
+  std::vector<Index> points;
+};
+
+CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
+  std::vector<Index> count(static_cast<std::size_t>(mesh.num_cells()), 0);
+  for (Index cell : embedding.cells)
+    if (cell >= 0) ++count[cell];
+  struct Keyed {
+    std::uint64_t code;
+    Index cell;
+    bool operator<(const Keyed& other) const { return code != other.code ? code < other.code : cell < other.cell; }
+  };
+  const auto corner = [&](Index cell) { return Vector(mesh.vertices().row(mesh.cell_vertices(cell)[0]).transpose()); };
+  Vector low, high;
+  if (mesh.num_vertices() > 0) {
+    low = mesh.vertices().colwise().minCoeff().transpose();
+    high = mesh.vertices().colwise().maxCoeff().transpose();
+  }
+  const double extent = mesh.num_vertices() > 0 ? (high - low).maxCoeff() : 0;
+  const double scale = extent > 0 ? 1 / extent : 0;
+  std::vector<Keyed> keyed;
+  for (Index cell = 0; cell < mesh.num_cells(); ++cell)
+    if (count[cell] > 0) keyed.push_back({morton_code((corner(cell) - low) * scale), cell});
+  std::sort(keyed.begin(), keyed.end());
+
+  CellOrder order;
+  order.first_point.push_back(0);
+  std::vector<Index> next(count.size(), 0);
+  for (const Keyed& key : keyed) {
+    next[key.cell] = order.first_point.back();
+    order.cells.push_back(key.cell);
+    order.first_point.push_back(order.first_point.back() + count[key.cell]);
+  }
+  order.points.resize(static_cast<std::size_t>(order.first_point.back()));
+  for (Index p = 0; p < embedding.num_points(); ++p)
+    if (embedding.cells[p] >= 0) order.points[next[embedding.cells[p]]++] = p;
+  return order;
+}
+
+std::vector<Index> vertices_by_first_use(const Mesh& mesh, const CellOrder& order) {
+  std::vector<char> seen(static_cast<std::size_t>(mesh.num_vertices()), 0);
+  std::vector<Index> active;
+  for (Index cell : order.cells)
+    for (Index v : mesh.cell_vertices(cell))
+      if (!seen[v]) {
+        seen[v] = 1;
+        active.push_back(v);
+      }
+  return active;
+}
+
+}  // namespace
+
+std::vector<Index> active_vertices(const Mesh& mesh, const Embedding& embedding) {
+  return vertices_by_first_use(mesh, order_cells(mesh, embedding));
+}
+
+namespace {
+
+// Sorted order and its inverse; the inverse is empty where both are the caller's order.
+std::vector<Index> inverse_unless_identity(const std::vector<Index>& permutation) {
+  std::vector<Index> inverse;
+  if (std::is_sorted(permutation.begin(), permutation.end())) return inverse;
+  inverse.resize(permutation.size());
+  for (std::size_t s = 0; s < permutation.size(); ++s) inverse[permutation[s]] = static_cast<Index>(s);
+  return inverse;
+}
+
+void count_points(const Embedding& embedding, BindReport& report) {
+  report.num_points = embedding.num_points();
+  std::array<Index, 4> count{};
+  for (PointStatus status : embedding.status) ++count[static_cast<std::size_t>(status)];
+  report.num_inside = count[static_cast<std::size_t>(PointStatus::inside)];
+  report.num_boundary = count[static_cast<std::size_t>(PointStatus::boundary)];
+  report.num_outside = count[static_cast<std::size_t>(PointStatus::outside)];
+  report.num_not_found = count[static_cast<std::size_t>(PointStatus::not_found)];
+  for (const OutsidePoint& outside : embedding.outside)
+    report.max_outside_distance = std::max(report.max_outside_distance, outside.distance);
+}
+
+// Row of embedding.outside of each point that is outside and served, else −1; empty where no point is outside.
+std::vector<Index> outside_rows(const Embedding& embedding) {
+  std::vector<Index> row;
+  for (std::size_t o = 0; o < embedding.outside.size(); ++o) {
+    const Index point = embedding.outside[o].point;
+    if (embedding.status[point] != PointStatus::outside) continue;
+    if (row.empty()) row.assign(embedding.cells.size(), -1);
+    row[point] = static_cast<Index>(o);
+  }
+  return row;
+}
+
+// Fills the runs of one element type from the cells `members` (places in order.cells); sizes are exact.
+template <class Runs, class Scalar>
+void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& order, std::span<const Index> members,
+               std::span<const Index> number, std::span<const Index> outside_row, Runs& runs, Index* permutation) {
+  using E = typename Runs::element;
+  constexpr int n = E::num_nodes, d = E::dim;
+  const auto num_runs = members.size();
+  runs.nodes.resize(num_runs);
+  runs.rest.resize(num_runs);
+  runs.first.resize(num_runs + 1);
+  for (std::size_t r = 0; r < num_runs; ++r)
+    runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
+  const auto num_points = static_cast<std::size_t>(runs.first.back());
+  runs.local.assign(num_points * d + kernels::local_padding, Scalar(0));
+  if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
+  if (!outside_row.empty() && !E::affine) runs.offset.assign(num_points, -1);
+  parallel_for(static_cast<std::int64_t>(num_runs), 4096, [&](std::int64_t begin, std::int64_t end) {
+    for (auto r = static_cast<Index>(begin); r < end; ++r) {
+      const Index cell = order.cells[members[r]];
+      const std::size_t b = mesh.block_of(cell);
+      const auto positions =
+          node_positions(mesh, std::get<ElementBlock<E>>(mesh.blocks()[b]), cell - mesh.first_cell(b));
+      const std::span<const Index> vertices = mesh.cell_vertices(cell);
+      for (int i = 0; i < n; ++i) {
+        runs.nodes[r][i] = number[vertices[i]];
+        for (int k = 0; k < d; ++k) runs.rest[r][i][k] = static_cast<Scalar>(positions(i, k) - positions(0, k));
+      }
+      const Index* points = order.points.data() + order.first_point[members[r]];
+      for (Index p = runs.first[r]; p < runs.first[r + 1]; ++p, ++points) {
+        permutation[p] = *points;
+        // On a simplex a point outside differs from one inside by its ξ alone; elsewhere it keeps its offset apart.
+        const bool outside = !outside_row.empty() && outside_row[*points] >= 0;
+        for (int k = 0; k < d; ++k) {
+          double xi = embedding.local(*points, k);
+          if (E::affine && outside) xi += embedding.outside[outside_row[*points]].offset[k];
+          runs.local[runs.local_place(r, p, k)] = static_cast<Scalar>(xi);
+        }
+        if (outside) runs.extrapolates[r] = 1;
+      }
+    }
+  });
+  for (std::size_t p = 0; p < runs.offset.size(); ++p) {
+    if (outside_row[permutation[p]] < 0) continue;
+    runs.offset[p] = static_cast<Index>(runs.offsets.size());
+    auto& offset = runs.offsets.emplace_back();
+    for (int k = 0; k < d; ++k)
+      offset[k] = static_cast<Scalar>(embedding.outside[outside_row[permutation[p]]].offset[k]);
+  }
+}
+
+// Rows of the first `num_active` of `vertices`; the vertices that only the rows read are appended to `vertices`.
+template <class Stencils>
+void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index num_active,
+                   std::vector<Index>& vertices, std::vector<Index>& number, Stencils& stencils) {
+  using Scalar = typename decltype(stencils.weights)::value_type;
+  std::vector<Index> row_of(number.size(), -1);
+  for (Index r = 0; r < table.num_rows(); ++r) row_of[table.vertices[r]] = r;
+  const int d = table.gdim, sym = with_hessians ? num_symmetric(d) : 0, width = d + sym;
+  stencils.offsets.resize(static_cast<std::size_t>(num_active) + 1);
+  for (Index v = 0; v < num_active; ++v) {
+    const Index r = row_of[vertices[v]];
+    if (r < 0) raise("no gradient stencil for vertex {}: reconstruct every active vertex", vertices[v]);
+    stencils.offsets[v + 1] = stencils.offsets[v] + table.offsets[r + 1] - table.offsets[r];
+  }
+  stencils.neighbors.resize(static_cast<std::size_t>(stencils.offsets.back()));
+  stencils.weights.resize(stencils.neighbors.size() * static_cast<std::size_t>(width));
+  for (Index v = 0; v < num_active; ++v) {
+    const Index r = row_of[vertices[v]];
+    Offset to = stencils.offsets[v];
+    for (Offset e = table.offsets[r]; e < table.offsets[r + 1]; ++e, ++to) {
+      Index& neighbor = number[table.neighbors[e]];
+      if (neighbor < 0) {
+        neighbor = static_cast<Index>(vertices.size());
+        vertices.push_back(table.neighbors[e]);
+      }
+      stencils.neighbors[to] = neighbor;
+      for (int k = 0; k < d; ++k) stencils.weights[to * width + k] = static_cast<Scalar>(table.weights[e * d + k]);
+      for (int k = 0; k < sym; ++k)
+        stencils.weights[to * width + d + k] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
+    }
+  }
+  vertices.shrink_to_fit();
+}
+
+}  // namespace
+
+template <class Scalar>
+Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, const InterpolationRule& rule,
+                                 const Reconstruction* reconstruction) {
+  if (embedding.gdim != mesh.gdim())
+    raise("points embedded in {} dimensions, but the mesh has {}", embedding.gdim, mesh.gdim());
+  auto binding = std::make_unique<Binding>();
+  binding->rule = rule;
+  binding->gdim = mesh.gdim();
+  const CellOrder order = order_cells(mesh, embedding);
+  binding->vertices = vertices_by_first_use(mesh, order);
+  binding->num_active = static_cast<Index>(binding->vertices.size());
+  std::vector<Index> number(static_cast<std::size_t>(mesh.num_vertices()), -1);
+  for (std::size_t a = 0; a < binding->vertices.size(); ++a) number[binding->vertices[a]] = static_cast<Index>(a);
+
+  const std::vector<Index> outside_row = outside_rows(embedding);
+  binding->permutation.resize(embedding.cells.size());
+  Index base = 0;
+  Elements::for_each([&]<class E>() {
+    const auto is_block = [](const AnyBlock& block) { return std::holds_alternative<ElementBlock<E>>(block); };
+    if (std::none_of(mesh.blocks().begin(), mesh.blocks().end(), is_block)) return;
+    std::vector<Index> members;
+    for (std::size_t c = 0; c < order.cells.size(); ++c)
+      if (is_block(mesh.blocks()[mesh.block_of(order.cells[c])])) members.push_back(static_cast<Index>(c));
+    if (members.empty()) return;
+    if (rule.formula == Formula::quadratic10 && !E::affine)
+      raise("quadratic10 is defined on simplices; cell {} is a {}", order.cells[members[0]], E::name);
+    using Runs = typename Binding::template Runs<E>;
+    Runs runs;
+    runs.base = base;
+    pack_runs<Runs, Scalar>(mesh, embedding, order, members, number, outside_row, runs,
+                            binding->permutation.data() + base);
+    base += runs.num_points();
+    binding->blocks.emplace_back(std::move(runs));
+  });
+  binding->num_served = base;
+  for (Index p = 0; p < embedding.num_points(); ++p)
+    if (embedding.cells[p] < 0) binding->permutation[base++] = p;
+  binding->position = inverse_unless_identity(binding->permutation);
+
+  BindReport& report = binding->report;
+  count_points(embedding, report);
+  report.num_cells = mesh.num_cells();
+  report.num_active_cells = static_cast<Index>(order.cells.size());
+  report.num_vertices = mesh.num_vertices();
+  report.num_active_vertices = binding->num_active;
+
+  // α = 0 takes no gradients even where they are offered.
+  if (rule.needs_gradients() && reconstruction != nullptr) {
+    const GradientStencilTable& table = reconstruction->stencils;
+    if (table.gdim != mesh.gdim()) raise("stencils of dimension {} for a mesh of {}", table.gdim, mesh.gdim());
+    if (rule.needs_hessians() && !table.has_hessians() && table.num_rows() > 0)
+      raise("dual_taylor needs vertex Hessians: use the reconstructor kriging with \"drift\": \"cubic\"");
+    binding->has_gradients = true;
+    if (reconstruction->blend)
+      binding->blended = select_rows(*reconstruction, binding->vertices);
+    else
+      pack_stencils(table, rule.needs_hessians(), binding->num_active, binding->vertices, number, binding->stencils);
+    report.num_stencil_entries =
+        binding->blended ? table.num_entries() : static_cast<Offset>(binding->stencils.neighbors.size());
+  }
+  const auto bytes = [](const auto& vector) { return static_cast<Offset>(vector.capacity() * sizeof(vector[0])); };
+  for (const auto& any : binding->blocks)
+    std::visit(
+        [&](const auto& runs) {
+          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.local) +
+                          bytes(runs.offset) + bytes(runs.offsets) + bytes(runs.extrapolates);
+        },
+        any);
+  report.bytes += bytes(binding->vertices) + bytes(binding->permutation) + bytes(binding->position) +
+                  bytes(binding->stencils.offsets) + bytes(binding->stencils.neighbors) +
+                  bytes(binding->stencils.weights);
+  if (binding->blended)
+    for (const GradientStencilTable* table : {&binding->blended->stencils, &binding->blended->blend->averaging})
+      report.bytes += bytes(table->offsets) + bytes(table->neighbors) + bytes(table->weights);
+  binding_ = std::move(binding);
+}
+
+template Interpolant<float>::Interpolant(const Mesh&, const Embedding&, const InterpolationRule&,
+                                         const Reconstruction*);
+template Interpolant<double>::Interpolant(const Mesh&, const Embedding&, const InterpolationRule&,
+                                          const Reconstruction*);
+
+}  // namespace halfgrad

@@ -1,0 +1,156 @@
+// What an interpolant holds after bind. Internal to the framework.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "framework/error.hpp"
+#include "framework/interpolant.hpp"
+#include "framework/parallel.hpp"
+
+namespace halfgrad {
+
+template <class Scalar>
+struct Interpolant<Scalar>::Binding {
+  // Points a task; below the threshold a frame is too short to wake a second thread for.
+  static constexpr Offset points_per_task = 8192;
+  static constexpr Offset parallel_threshold = 200'000;
+
+  // The cells of one element type that hold points: one run of points a cell.
+  //   nodes        [run][node]          number of the vertex
+  //   rest         [run][node][axis]    rest position relative to the run's first node
+  //   first        [run]                position of the run's first point in the block
+  //   local        [run][axis][point]   ξ; for simplices of a point outside too
+  //   offset       [point]              row of `offsets` for points outside, else −1 (empty where no point is outside)
+  //   extrapolates [run]                1 where a point is outside (empty where none is)
+  template <class E>
+  struct Runs {
+    using element = E;
+    Index base = 0;  // sorted position of the block's first point
+    std::vector<std::array<Index, E::num_nodes>> nodes;
+    std::vector<std::array<std::array<Scalar, E::dim>, E::num_nodes>> rest;
+    std::vector<Index> first;
+    std::vector<Scalar> local;
+    std::vector<Index> offset;
+    std::vector<std::array<Scalar, E::dim>> offsets;
+    std::vector<std::uint8_t> extrapolates;
+
+    Index num_runs() const { return static_cast<Index>(nodes.size()); }
+    Index num_points() const { return first.back(); }
+    // Place of ξ_k of the run's point p in `local`.
+    std::size_t local_place(Index run, Index p, int k) const {
+      const Offset count = first[run + 1] - first[run];
+      return static_cast<std::size_t>(static_cast<Offset>(first[run]) * E::dim + k * count + (p - first[run]));
+    }
+    ReferencePoint<E> xi(Index run, Index p) const {
+      ReferencePoint<E> result;
+      for (int k = 0; k < E::dim; ++k) result[k] = static_cast<double>(local[local_place(run, p, k)]);
+      return result;
+    }
+    // Weights of one point.
+    NodeVector<E> beta(Index run, Index p) const {
+      const ReferencePoint<E> at = xi(run, p);
+      NodeVector<E> result = E::shape(at);
+      if (!offset.empty() && offset[p] >= 0) {
+        const NodeMatrix<E> gradient = E::shape_gradient(at);
+        for (int k = 0; k < E::dim; ++k) result += gradient.col(k) * static_cast<double>(offsets[offset[p]][k]);
+      }
+      return result;
+    }
+  };
+  using AnyRuns = Elements::apply<std::variant, Runs>;
+
+  // Rows of the active vertices in the numbering of `vertices`: weights of gradients, then of Hessians, an entry.
+  struct Stencils {
+    std::vector<Offset> offsets{0};
+    std::vector<Index> neighbors;
+    std::vector<Scalar> weights;
+  };
+
+  InterpolationRule rule;
+  BindReport report;
+  int gdim = 0;
+  Index num_active = 0;
+  Index num_served = 0;         // points with a cell
+  std::vector<Index> vertices;  // the mesh's number of each vertex: active ones first, then those that stencils read
+  std::vector<AnyRuns> blocks;
+  std::vector<Index> permutation;  // the caller's point at each sorted position, those not found last
+  std::vector<Index> position;     // its inverse; empty where the orders are the same
+  bool has_gradients = false;
+  Stencils stencils;
+  std::optional<Reconstruction> blended;  // instead of stencils
+
+  void require_values(const Values<Scalar>& values) const {
+    if (values.rows() != report.num_vertices)
+      raise("values of {} vertices: the mesh has {}", values.rows(), report.num_vertices);
+  }
+  void require_gradients() const {
+    if (!has_gradients)
+      raise("this interpolant was bound without a reconstructor: give vertex gradients to evaluate_given");
+  }
+
+  int num_stencil_weights() const { return gdim + (rule.needs_hessians() ? num_symmetric(gdim) : 0); }
+
+  // Calls body(runs, begin, end) on ranges of runs that hold some thousand points each.
+  template <class Body>
+  void for_each_range(Body&& body) const {
+    for (const AnyRuns& any : blocks)
+      std::visit(
+          [&](const auto& runs) {
+            const Offset num_runs = runs.num_runs();
+            const Offset num_points = runs.num_points();
+            const Offset grain = num_points < parallel_threshold
+                                     ? num_runs
+                                     : std::max<Offset>(1, num_runs * points_per_task / num_points);
+            parallel_for(num_runs, grain, [&](std::int64_t begin, std::int64_t end) {
+              body(runs, static_cast<Index>(begin), static_cast<Index>(end));
+            });
+          },
+          any);
+  }
+
+  // Bound of the quadratic correction over a cell: α (1 − 1/n)/2 · max |(F_i − F_j)(X_j − X_i)|, from writing the
+  // correction as α Σ_{i<j} β_i β_j (F_i − F_j)(X_j − X_i); holds for points inside.
+  template <Element E>
+  double correction_bound(const Runs<E>& runs, Index run, const Values<Scalar>& gradients, Eigen::Index columns) const {
+    double largest = 0;
+    for (int i = 0; i < E::num_nodes; ++i)
+      for (int j = 0; j < i; ++j) {
+        double squared = 0;
+        for (Eigen::Index c = 0; c < columns; ++c) {
+          double component = 0;
+          for (int k = 0; k < E::dim; ++k)
+            component += static_cast<double>(gradients(runs.nodes[run][i], c * E::dim + k) -
+                                             gradients(runs.nodes[run][j], c * E::dim + k)) *
+                         static_cast<double>(runs.rest[run][j][k] - runs.rest[run][i][k]);
+          squared += component * component;
+        }
+        largest = std::max(largest, squared);
+      }
+    return std::abs(rule.alpha) * (1 - 1.0 / E::num_nodes) / 2 * std::sqrt(largest);
+  }
+  // NaN gradients bound nothing, and a run with points outside is not bounded by its nodes.
+  template <Element E>
+  bool is_linear(const Runs<E>& runs, Index run, const Values<Scalar>& gradients, Eigen::Index columns,
+                 double tolerance) const {
+    if (!(tolerance > 0) || rule.formula != Formula::blend) return false;
+    if (!runs.extrapolates.empty() && runs.extrapolates[run]) return false;
+    return correction_bound(runs, run, gradients, columns) <= tolerance;
+  }
+
+  // The plain path.
+  void plain_vertex_stage(const Values<Scalar>& values, int first_weight, int width, Values<Scalar>& out) const;
+  Values<Scalar> vertex_hessians(const Values<Scalar>& values) const;
+  template <int fixed_columns, class E>
+  void plain_point_stage(const Runs<E>& runs, Index begin, Index end, const Values<Scalar>& values,
+                         const Values<Scalar>& gradients, const Values<Scalar>& hessians, double tolerance,
+                         Scalar* out) const;
+
+  // Both stages into `out`, #points × #columns in sorted order. Gradients come from the stencils where null.
+  void frame(const Values<Scalar>& values, const Values<Scalar>* gradients, const Values<Scalar>* hessians,
+             const EvaluateOptions& options, Workspace<Scalar>& workspace, Scalar* out) const;
+  void to_caller_order(const Values<Scalar>& sorted, Values<Scalar>& out) const;
+};
+
+}  // namespace halfgrad
