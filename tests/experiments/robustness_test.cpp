@@ -1,6 +1,7 @@
 // Never worse than linear: the vertex-based stencils on the meshes that destroy averages of cell gradients.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
