@@ -148,7 +148,7 @@ class LevelRun {
         level_(level),
         progress_(std::move(progress)),
         mesh_(config.mesh.make(level)),
-        cloud_(config.points(mesh_, level)) {}
+        cloud_(config.points(mesh_, config.mesh.is_zoom ? 0 : level)) {}
 
   std::vector<ResultRow> run(LevelPicture* picture) {
     bind(picture);

@@ -190,6 +190,40 @@ void bcc_tetrahedra(Builder& builder, std::array<int, 3> n) {
   });
 }
 
+/// Two wedges a box, upright on Kuhn's triangles.
+void wedges(Builder& builder, std::array<int, 3> n) {
+  const Grid at(builder, n, 3);
+  for_each_box(n, 3, [&](int i, int j, int k) {
+    builder.cells.push_back({at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j, k + 1), at(i + 1, j, k + 1),
+                             at(i + 1, j + 1, k + 1)});
+    builder.cells.push_back({at(i, j, k), at(i + 1, j + 1, k), at(i, j + 1, k), at(i, j, k + 1),
+                             at(i + 1, j + 1, k + 1), at(i, j + 1, k + 1)});
+  });
+}
+
+/// Six pyramids around the center of each box.
+void pyramids(Builder& builder, std::array<int, 3> n) {
+  const Grid at(builder, n, 3);
+  for_each_box(n, 3, [&](int i, int j, int k) {
+    const Index center = builder.add((i + 0.5) / n[0], (j + 0.5) / n[1], (k + 0.5) / n[2]);
+    for (int axis = 0; axis < 3; ++axis)
+      for (int side = 0; side < 2; ++side) {
+        // The base, counter-clockwise seen from the center.
+        const int b = (axis + 1 + side) % 3, c = (axis + 2 - side) % 3;
+        std::vector<Index> cell;
+        for (int corner = 0; corner < 4; ++corner) {
+          std::array<int, 3> place{i, j, k};
+          place[axis] += side;
+          place[b] += corner == 1 || corner == 2;
+          place[c] += corner >= 2;
+          cell.push_back(at(place[0], place[1], place[2]));
+        }
+        cell.push_back(center);
+        builder.cells.push_back(std::move(cell));
+      }
+  });
+}
+
 /// One way to mesh a box.
 struct Pattern {
   std::string_view element, name;
@@ -206,6 +240,8 @@ constexpr std::array patterns = {
     Pattern{"tetrahedron", "five", five_tetrahedra},
     Pattern{"tetrahedron", "bcc", bcc_tetrahedra},
     Pattern{"hexahedron", "", hexahedra},
+    Pattern{"wedge", "", wedges},
+    Pattern{"pyramid", "", pyramids},
 };
 
 const Pattern& find_pattern(const LatticeOptions& options) {

@@ -5,6 +5,7 @@
 
 #include "experiments/ball.hpp"
 #include "experiments/lattice.hpp"
+#include "experiments/random_delaunay.hpp"
 #include "framework/error.hpp"
 #include "framework/io/mesh_file.hpp"
 #include "framework/json_reader.hpp"
@@ -93,6 +94,43 @@ MeshSource ball_source(const json& specification, const std::string& pointer, in
   return {levels, gdim, at_level};
 }
 
+MeshSource random_delaunay_source(const json& specification, const std::string& pointer, int levels, double factor,
+                                  std::uint64_t seed, json& resolved) {
+  JsonReader reader(specification, pointer);
+  RandomDelaunayOptions options;
+  options.gdim = static_cast<int>(reader.integer("dimension", options.gdim));
+  if (options.gdim != 2 && options.gdim != 3)
+    raise("{}: found {}, expected 2 or 3", reader.pointer_to("dimension"), options.gdim);
+  options.num_points = static_cast<Index>(reader.integer("vertices", options.num_points));
+  reader.finish();
+  resolved = reader.resolved();
+  const auto at_level = [=](int level) {
+    RandomDelaunayOptions finer = options;
+    finer.num_points = static_cast<Index>(std::lround(options.num_points * std::pow(factor, options.gdim * level)));
+    finer.seed = seed + static_cast<std::uint64_t>(level);
+    return make_random_delaunay(finer);
+  };
+  return {levels, options.gdim, at_level};
+}
+
+/// The source's one mesh, shrunk about the origin level by level.
+MeshSource zoomed(const MeshSource& source, const json& specification, const std::string& pointer, json& resolved) {
+  JsonReader reader(specification, pointer);
+  const std::int64_t levels = reader.integer("levels", 5), first = reader.integer("first", 0);
+  if (levels < 1 || levels > 12) raise("{}: found {}, expected 1 to 12", reader.pointer_to("levels"), levels);
+  const double factor = reader.number("factor", 2);
+  if (!(factor > 1)) raise("{}: found {}, expected more than 1", reader.pointer_to("factor"), factor);
+  reader.finish();
+  resolved = reader.resolved();
+  if (source.num_levels != 1)
+    raise("{}: found a mesh of {} levels, expected one: a zoom makes its own", pointer, source.num_levels);
+  const auto at_level = [=](int level) {
+    const Mesh mesh = source.make(0);
+    return Mesh(mesh.vertices() * std::pow(factor, -static_cast<double>(first + level)), mesh.blocks());
+  };
+  return {static_cast<int>(levels), source.gdim, at_level, true};
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> read_paths(const json& value, const std::string& pointer,
@@ -121,7 +159,7 @@ MeshSource read_mesh_source(const json& specification, const std::string& pointe
     const auto paths = read_paths(*file, reader.pointer_to("file"), directory);
     source = {static_cast<int>(paths.size()), 0, [paths](int level) { return read_mesh(paths[level]); }};
   }
-  for (const std::string_view kind : {"lattice", "ball", "disc"}) {
+  for (const std::string_view kind : {"lattice", "ball", "disc", "random_delaunay"}) {
     const json* options = reader.find(kind);
     if (options == nullptr) continue;
     ++kinds;
@@ -129,12 +167,21 @@ MeshSource read_mesh_source(const json& specification, const std::string& pointe
     const int levels = read_refinements(reader, factor);
     json filled;
     const std::string where = reader.pointer_to(kind);
-    source = kind == "lattice" ? lattice_source(*options, where, levels, factor, seed, filled)
-                               : ball_source(*options, where, kind == "ball" ? 3 : 2, levels, factor, seed, filled);
+    if (kind == "lattice")
+      source = lattice_source(*options, where, levels, factor, seed, filled);
+    else if (kind == "random_delaunay")
+      source = random_delaunay_source(*options, where, levels, factor, seed, filled);
+    else
+      source = ball_source(*options, where, kind == "ball" ? 3 : 2, levels, factor, seed, filled);
     reader.record(kind, filled);
   }
+  if (kinds != 1) raise("{}: found {} of lattice, ball, disc, random_delaunay, file; expected one", pointer, kinds);
+  if (const json* zoom = reader.find("zoom")) {
+    json filled;
+    source = zoomed(source, *zoom, reader.pointer_to("zoom"), filled);
+    reader.record("zoom", filled);
+  }
   reader.finish();
-  if (kinds != 1) raise("{}: found {} of lattice, ball, disc, file; expected one", pointer, kinds);
   resolved = reader.resolved();
   return source;
 }

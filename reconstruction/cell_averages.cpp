@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "framework/error.hpp"
 #include "reconstruction/row_assembly.hpp"
 #include "reconstruction/symmetric_eigen.hpp"
+#include "reconstruction/vertex_rings.hpp"
 
 namespace halfgrad {
 
@@ -149,14 +151,18 @@ CellWeights Knn::weights(const CellGradients& cells, Index vertex) const {
     found.insert(found.end(), ring.begin(), ring.end());
     std::inplace_merge(found.begin(), found.begin() + middle, found.end());
   }
-  // Equal distances (lattices) are told apart by round-off unless compared with a tolerance; the cell number decides.
-  std::sort(further.begin(), further.end(), [](const UsableCell& a, const UsableCell& b) {
-    const double da = a.offset.squaredNorm(), db = b.offset.squaredNorm();
-    if (std::abs(da - db) > 1e-12 * (da + db)) return da < db;
-    return a.cell < b.cell;
-  });
-  if (static_cast<int>(further.size()) > options_.k) further.resize(options_.k);
-  usable.insert(usable.end(), further.begin(), further.end());
+  // Cells that tie with the k-th one (lattices) are taken too: neither round-off nor numbering chooses among them.
+  double cut = std::numeric_limits<double>::infinity();
+  if (options_.k == 0) {
+    cut = -1;
+  } else if (static_cast<int>(further.size()) > options_.k) {
+    std::vector<double> distances;
+    for (const UsableCell& cell : further) distances.push_back(cell.offset.squaredNorm());
+    std::nth_element(distances.begin(), distances.begin() + (options_.k - 1), distances.end());
+    cut = distances[options_.k - 1] * (1 + 2 * distance_tie);
+  }
+  for (const UsableCell& cell : further)
+    if (cell.offset.squaredNorm() <= cut) usable.push_back(cell);
   return consistent_weights(usable, options_.epsilon, vertex);
 }
 

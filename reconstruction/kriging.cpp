@@ -137,8 +137,7 @@ class KrigingRow {
     double cut = std::numeric_limits<double>::infinity();
     if (static_cast<std::size_t>(rule.num_points) < candidates_.size()) {
       std::nth_element(candidates_.begin(), candidates_.begin() + (rule.num_points - 1), candidates_.end());
-      constexpr double tie = 1e-9;
-      cut = candidates_[rule.num_points - 1].first * (1 + 2 * tie);
+      cut = candidates_[rule.num_points - 1].first * (1 + 2 * distance_tie);
     }
     for (const auto& [squared_distance, v] : candidates_)
       if (squared_distance <= cut) patch_.push_back(v);

@@ -1,8 +1,6 @@
 #include "reconstruction/kriging_system.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -23,8 +21,8 @@ constexpr double correlation_length = 6;
 constexpr double quadratic_nugget = 1e-5, cubic_nugget = 1e-6;
 // Modes with smaller singular values are damped.
 constexpr double full_inverse = 2;
-constexpr int max_modes = 10;
-using SmallSvd = Eigen::JacobiSVD<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_modes, max_modes>>;
+constexpr int max_modes = 10;  // of the cubic stage in 3D
+using SmallSquare = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_modes, max_modes>;
 
 constexpr int num_cubic(int dim) { return dim * (dim + 1) * (dim + 2) / 6; }
 
@@ -72,34 +70,64 @@ void fill_drift(const Eigen::Ref<const MatrixXd>& points, int degree, Eigen::Ref
 
 // One degree of the drift, fitted to what the degrees before it leave.
 struct Stage {
-  Block columns;    // its whitened drift columns, #rows × size
-  Block inverse;    // filtered pseudo-inverse of the columns' part outside the basis, size × #rows
-  Block operation;  // Z: from data to this degree's coefficients, size × #rows
+  Block columns;    // its whitened drift columns, #points × size
+  Block inverse;    // filtered pseudo-inverse of the columns' part outside the basis, size × #points
+  Block operation;  // Z: from data to this degree's coefficients, size × #points
 };
+
+// A ← A V with orthogonal columns, by rotations of pairs (one-sided Jacobi: Hestenes 1958); V is accumulated. The norms
+// of the columns are then the singular values, to high relative accuracy, and no zero column is divided by.
+void orthogonalize_columns(Block& a, SmallSquare& v) {
+  const Eigen::Index size = a.cols();
+  v.setIdentity(size, size);
+  const double negligible = 1e-24 * a.squaredNorm();
+  for (int sweep = 0; sweep < 30; ++sweep) {
+    bool rotated = false;
+    for (Eigen::Index p = 0; p < size; ++p)
+      for (Eigen::Index q = p + 1; q < size; ++q) {
+        const double pp = a.col(p).squaredNorm(), qq = a.col(q).squaredNorm(), pq = a.col(p).dot(a.col(q));
+        if (!(std::abs(pq) > 1e-14 * std::sqrt(pp * qq)) || std::min(pp, qq) <= negligible) continue;
+        rotated = true;
+        const double zeta = (qq - pp) / (2 * pq);
+        const double t = (zeta < 0 ? -1 : 1) / (std::abs(zeta) + std::hypot(1.0, zeta));
+        const double c = 1 / std::hypot(1.0, t), s = c * t;
+        const auto rotate = [&](double* x, double* y, Eigen::Index count) {
+          for (Eigen::Index i = 0; i < count; ++i) {
+            const double old = x[i];
+            x[i] = c * old - s * y[i];
+            y[i] = s * old + c * y[i];
+          }
+        };
+        rotate(a.col(p).data(), a.col(q).data(), a.rows());
+        rotate(v.col(p).data(), v.col(q).data(), size);
+      }
+    if (!rotated) return;
+  }
+}
 
 // Projects the stage's columns on the complement of the basis, inverts what is left and extends the basis by the modes
 // that are determined. Returns the smallest singular value.
-double fit_stage(Stage& stage, bool damp, Block& basis_memory, Eigen::Index& num_basis, Block& projected) {
-  const Eigen::Index size = stage.columns.cols();
-  const auto basis = basis_memory.leftCols(num_basis);
+double fit_stage(Stage& stage, bool damp, Block& basis, Eigen::Index& num_basis, Block& projected) {
+  const Eigen::Index size = stage.columns.cols(), num_before = num_basis;
   projected = stage.columns;
-  for (int pass = 0; pass < 2 && num_basis > 0; ++pass)  // twice is enough for orthogonality to round-off
-    projected -= (basis * (basis.transpose() * projected).eval()).eval();
-  Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(projected);
-  const SmallSvd svd(qr.matrixQR().topRows(size).triangularView<Eigen::Upper>().toDenseMatrix(),
-                     Eigen::ComputeFullU | Eigen::ComputeFullV);
-  auto modes = basis_memory.middleCols(num_basis, size);
-  modes.setZero();
-  modes.topRows(size) = svd.matrixU();
-  modes.applyOnTheLeft(qr.householderQ());
-  const double largest = svd.singularValues()[0], smallest = svd.singularValues()[size - 1];
+  for (int pass = 0; pass < 2; ++pass)  // twice is enough for orthogonality to round-off
+    for (Eigen::Index k = 0; k < num_before; ++k)
+      for (Eigen::Index c = 0; c < size; ++c) projected.col(c) -= basis.col(k).dot(projected.col(c)) * basis.col(k);
+  SmallSquare v;
+  orthogonalize_columns(projected, v);
+  double largest = 0, smallest = std::numeric_limits<double>::infinity();
+  for (Eigen::Index m = 0; m < size; ++m) {
+    largest = std::max(largest, projected.col(m).norm());
+    smallest = std::min(smallest, projected.col(m).norm());
+  }
   stage.inverse.setZero();
   for (Eigen::Index m = 0; m < size; ++m) {
-    const double s = svd.singularValues()[m];
-    if (!(s > 1e-10 * largest)) break;
+    const double s = projected.col(m).norm();
+    if (!(s > 1e-10 * largest)) continue;
+    projected.col(m) /= s;
     const double filtered = damp && s < full_inverse ? s / (full_inverse * full_inverse) : 1 / s;
-    stage.inverse.noalias() += filtered * svd.matrixV().col(m) * modes.col(m).transpose();
-    if (!damp || s >= full_inverse) ++num_basis;
+    for (Eigen::Index c = 0; c < size; ++c) stage.inverse.row(c) += filtered * v(c, m) * projected.col(m).transpose();
+    if (!damp || s >= full_inverse) basis.col(num_basis++) = projected.col(m);
   }
   return smallest;
 }
@@ -112,9 +140,7 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   const Eigen::Index n = points.cols(), dim = dim_, num_quadratic = num_symmetric(dim_);
   const Eigen::Index num_drift = dim + num_quadratic + (degree_ == 3 ? num_cubic(dim_) : 0);
   const Eigen::Index num_functionals = dim + (degree_ == 3 ? num_quadratic : 0);
-  // Zero rows below the points give every stage at least as many rows as columns.
-  const Eigen::Index rows = std::max<Eigen::Index>(n, max_modes);
-  memory_.resize(std::max<std::size_t>(memory_.size(), rows * (n + 2 + 6 * num_drift + 3 * num_functionals)));
+  memory_.resize(std::max<std::size_t>(memory_.size(), n * (n + 2 + 6 * num_drift + 3 * num_functionals)));
   Arena arena(memory_);
   const double rate = std::sqrt(7.0) / correlation_length, rate2 = rate * rate;
 
@@ -135,9 +161,8 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   Eigen::LLT<Eigen::Ref<MatrixXd>> cholesky(covariance);
 
   // Right-hand sides: drift columns, then the covariances of the data with the derivatives wanted.
-  Block whitened = arena.take(rows, num_drift + num_functionals);
-  whitened.setZero();
-  fill_drift(points, degree_, whitened.topLeftCorner(n, num_drift));
+  Block whitened = arena.take(n, num_drift + num_functionals);
+  fill_drift(points, degree_, whitened.leftCols(num_drift));
   Block quadratics = arena.take(n, num_quadratic);
   quadratics = whitened.block(0, dim, n, num_quadratic);
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -151,22 +176,18 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
       for (Eigen::Index b = a; b < dim; ++b)
         whitened(j, column++) = second * points(a, j) * points(b, j) + (a == b ? first + rate2 / 5 : 0);
   }
-  {
-    auto top = whitened.topRows(n);
-    cholesky.matrixL().solveInPlace(top);
-  }
+  cholesky.matrixL().solveInPlace(whitened);
 
   // Staged fit, in order of importance: a lower degree never pays for a higher one.
-  Block basis = arena.take(rows, num_drift);
+  Block basis = arena.take(n, num_drift);
   Eigen::Index num_basis = 0, first_column = 0;
   fit.smallest_singular_value = std::numeric_limits<double>::infinity();
   std::vector<Stage> stages;
   stages.reserve(3);
   for (int degree = 1; degree <= degree_; ++degree) {
     const Eigen::Index size = degree == 1 ? dim : (degree == 2 ? num_quadratic : num_cubic(dim_));
-    stages.push_back(
-        {Block(whitened.col(first_column).data(), rows, size), arena.take(size, rows), arena.take(size, rows)});
-    Block projected = arena.take(rows, size);
+    stages.push_back({Block(whitened.col(first_column).data(), n, size), arena.take(size, n), arena.take(size, n)});
+    Block projected = arena.take(n, size);
     const double smallest = fit_stage(stages.back(), degree > 1, basis, num_basis, projected);
     if (degree > 1) fit.smallest_singular_value = std::min(fit.smallest_singular_value, smallest);
     first_column += size;
@@ -175,15 +196,16 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   for (std::size_t t = stages.size(); t-- > 0;) {
     stages[t].operation = stages[t].inverse;
     for (std::size_t u = t + 1; u < stages.size(); ++u)
-      stages[t].operation.noalias() -= (stages[t].inverse * stages[u].columns).eval() * stages[u].operation;
+      stages[t].operation -=
+          SmallSquare(stages[t].inverse.lazyProduct(stages[u].columns)).lazyProduct(stages[u].operation);
   }
 
   // A functional's row: its value on the drift plus its covariance with the residual of the drift.
-  Block rows_out = arena.take(num_functionals, rows);
+  Block rows_out = arena.take(num_functionals, n);
   const auto covariances = whitened.rightCols(num_functionals);
   rows_out = covariances.transpose();
   for (const Stage& stage : stages)
-    rows_out.noalias() -= (covariances.transpose() * stage.columns).eval() * stage.operation;
+    rows_out -= SmallSquare(covariances.transpose().lazyProduct(stage.columns)).lazyProduct(stage.operation);
   rows_out.topRows(dim) += stages[0].operation;
   if (degree_ == 3) {
     Eigen::Index row = 0;

@@ -9,6 +9,10 @@
 
 namespace halfgrad {
 
+/// Distances that differ by less (relatively) tie, and patches take all that tie with their last member: on lattices
+/// neither numbering nor the round-off of positions far from the origin chooses among equals.
+inline constexpr double distance_tie = 1e-6;
+
 /// Breadth-first search over vertices that share a cell: rings follow the mesh, so that they never jump a gap as plain
 /// nearest neighbours would. Reusable; one a thread. The cells must outlive it.
 class VertexRings {
