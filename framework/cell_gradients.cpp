@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "framework/cell_extent.hpp"
+
 namespace halfgrad {
 
 CellGradients::CellGradients(const Mesh& mesh)
@@ -18,8 +20,7 @@ CellGradient CellGradients::gradient(Index cell) const {
     result.centroid = (edges.transpose() * E::shape(E::center())) + positions.row(0).transpose();
     const Eigen::Matrix<double, E::dim, E::dim> jacobian = edges.transpose() * derivative;
     const double determinant = jacobian.determinant();
-    const double scale = edges.rowwise().norm().maxCoeff();
-    if (!(std::abs(determinant) > 1e-14 * std::pow(scale, E::dim))) {
+    if (is_degenerate<E>(cell_extent<E>(edges), determinant)) {
       result.weights = NodeRows::Zero(E::num_nodes, E::dim);
       return result;
     }

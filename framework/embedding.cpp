@@ -32,13 +32,24 @@ void check(const Mesh& mesh, const Points& points, const EmbedOptions& options) 
     if (!points.row(p).allFinite()) raise("point {} is {}: expected finite coordinates", p, describe(points, p));
 }
 
-std::vector<char> degenerate_cells(const Mesh& mesh) {
+// The facets to which the distance of an unclaimed point counts: those of one cell, where degenerate cells are absent,
+// and all of folded cells. A position inside a folded cell whose ξ was not found is near that cell, not outside the
+// mesh by the distance to its boundary.
+std::vector<CellFacet> outer_facets(const Mesh& mesh) {
   std::vector<char> degenerate(mesh.num_cells(), 0);
+  std::vector<CellFacet> folded;
   for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
-    for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
-      degenerate[first + c] = InverseMap<E>(node_positions(mesh, block, c)).degenerate();
+    for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
+      const InverseMap<E> map(node_positions(mesh, block, c));
+      degenerate[first + c] = map.degenerate();
+      if (map.degenerate() || map.one_signed()) continue;
+      for (int side = 0; side < static_cast<int>(E::facets.size()); ++side)
+        folded.push_back({static_cast<Index>(first + c), side});
+    }
   });
-  return degenerate;
+  std::vector<CellFacet> facets = boundary_facets(mesh, degenerate);
+  facets.insert(facets.end(), folded.begin(), folded.end());
+  return facets;
 }
 
 // Where a point outside lies relative to its nearest cell.
@@ -106,7 +117,7 @@ Embedding embed(const Mesh& mesh, const Points& points, const EmbedOptions& opti
     if (result.cells[p] < 0) unclaimed.push_back(p);
   if (unclaimed.empty()) return result;
 
-  std::vector<CellFacet> facets = boundary_facets(mesh, degenerate_cells(mesh));
+  std::vector<CellFacet> facets = outer_facets(mesh);
   if (facets.empty()) raise("all {} cells of the mesh are degenerate: no point can be embedded", mesh.num_cells());
   const NearestCell search(mesh, std::move(facets));
   const double diagonal = (mesh.vertices().colwise().maxCoeff() - mesh.vertices().colwise().minCoeff()).norm();

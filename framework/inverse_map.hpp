@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "elements/element.hpp"
+#include "framework/cell_extent.hpp"
 
 namespace halfgrad {
 
@@ -28,16 +28,16 @@ class InverseMap {
   /// `positions`: num_nodes × dim.
   explicit InverseMap(const NodeMatrix<E>& positions) : origin_(positions.row(0).transpose()) {
     nodes_ = positions.rowwise() - positions.row(0);
+    Point extent = cell_extent<E>(nodes_);
     for (int a = 0; a < E::dim; ++a) {
-      const double extent = nodes_.col(a).maxCoeff() - nodes_.col(a).minCoeff();
-      int exponent = 0;
-      if (extent > 0) std::frexp(extent, &exponent);
-      scale_[a] = std::ldexp(1.0, -exponent);
+      scale_[a] = unit_scale(extent[a]);
+      extent[a] *= scale_[a];
       nodes_.col(a) *= scale_[a];
     }
     const Jacobian jacobian = nodes_.transpose() * E::shape_gradient(E::center());
     determinant_ = jacobian.determinant();
-    if (degenerate()) return;
+    degenerate_ = is_degenerate<E>(extent, determinant_);
+    if (degenerate_) return;
     inverse_ = jacobian.inverse();
     const NodeMatrix<E> reference = E::nodes();
     if constexpr (!E::affine) {
@@ -47,8 +47,10 @@ class InverseMap {
     }
   }
 
-  /// Whether the cell has no volume to rounding: it has no inverse map, and no other member but this may be used.
-  bool degenerate() const { return !(std::abs(determinant_) > 1e-14); }
+  /// is_degenerate of the cell: it has no inverse map, and no other member but this may be used.
+  bool degenerate() const { return degenerate_; }
+  /// Whether det J has one sign at all nodes; where not, the cell is folded and ξ need not be unique.
+  bool one_signed() const { return one_signed_; }
   /// Whether x(ξ) is affine on this cell.
   bool affine() const { return affine_; }
   /// β = shape(ξ(X)) is linear in X: ∂β_i/∂X_a, num_nodes × dim, of the affine part at the center.
@@ -181,6 +183,7 @@ class InverseMap {
   Point scale_;
   NodeMatrix<E> nodes_;  // relative to the origin, scaled
   double determinant_ = 0;
+  bool degenerate_ = false;
   Jacobian inverse_ = Jacobian::Zero();  // at the center, scaled
   double deviation_ = 0;
   bool affine_ = E::affine;

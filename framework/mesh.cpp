@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "framework/cell_extent.hpp"
 #include "framework/error.hpp"
 
 namespace halfgrad {
@@ -175,12 +176,15 @@ MeshReport inspect(const Mesh& mesh) {
         quality = std::min(quality, edge_product > 0 ? std::abs(determinant) / edge_product : 0);
       }
       const Index cell = static_cast<Index>(first + c);
-      const double smallest = std::min(std::abs(lowest), std::abs(highest));
-      if (!(smallest > 1e-14 * std::pow(longest, E::dim))) report.degenerate_cells.push_back(cell);
       if (lowest < 0) report.inverted_cells.push_back(cell);
       if (lowest < 0 && highest > 0) report.folded_cells.push_back(cell);
-      const Eigen::Matrix<double, E::dim, E::dim> jacobian = positions.transpose() * E::shape_gradient(E::center());
-      report.volume += std::abs(jacobian.determinant()) * E::reference_volume;
+      // Differences to the first node, so that an offset of the mesh does not blur a flat cell's determinant.
+      const NodeMatrix<E> edges_from_first = positions.rowwise() - positions.row(0);
+      const Eigen::Matrix<double, E::dim, E::dim> jacobian =
+          edges_from_first.transpose() * E::shape_gradient(E::center());
+      const double determinant = jacobian.determinant();
+      if (is_degenerate<E>(cell_extent<E>(edges_from_first), determinant)) report.degenerate_cells.push_back(cell);
+      report.volume += std::abs(determinant) * E::reference_volume;
       report.min_quality = std::min(report.min_quality, quality);
       quality_sum += quality;
     }

@@ -96,7 +96,7 @@ std::vector<char> boundary_vertices(const Mesh& mesh);
 
 /// What is wrong or notable in a mesh, found without changing it.
 struct MeshReport {
-  std::vector<Index> degenerate_cells;  ///< |det J| at some node below 1e-14 of the longest edge to the power dim
+  std::vector<Index> degenerate_cells;  ///< is_degenerate (cell_extent.hpp): they have no gradient and hold no points
   std::vector<Index> inverted_cells;    ///< det J negative at some node (accepted; weights do not depend on the sign)
   std::vector<Index> folded_cells;      ///< det J changes sign within the cell: its inverse map is not unique
   std::vector<Index> unused_vertices;   ///< in no cell

@@ -123,6 +123,105 @@ TYPED_TEST(Embed, DoesNotDependOnOffsetAndScale) {
     }
 }
 
+// Distance to a facet by sampling its parameters, ever closer around the best sample.
+double sampled_distance(const Eigen::MatrixXd& nodes, const Vector& position) {
+  const Eigen::Index n = nodes.rows();
+  const auto at = [&](double u, double v) {
+    Eigen::VectorXd weights(n);
+    if (n == 4) weights << (1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v;
+    if (n == 3) weights << 1 - u, u * (1 - v), u * v;
+    if (n == 2) weights << 1 - u, u;
+    if (n == 1) weights << 1;
+    return (nodes.transpose() * weights - position).norm();
+  };
+  double best = std::numeric_limits<double>::infinity(), best_u = 0.5, best_v = 0.5;
+  for (double reach = 0.5; reach > 1e-9; reach *= 0.25) {
+    const double middle_u = best_u, middle_v = best_v;
+    for (int i = -10; i <= 10; ++i)
+      for (int j = -10; j <= 10; ++j) {
+        const double u = std::clamp(middle_u + reach * i / 10, 0.0, 1.0),
+                     v = std::clamp(middle_v + reach * j / 10, 0.0, 1.0);
+        if (const double distance = at(u, v); distance < best) best = distance, best_u = u, best_v = v;
+      }
+  }
+  return best;
+}
+
+void expect_sampled_distances(const Mesh& mesh, const Points& points) {
+  const Embedding embedding = embed(mesh, points, {.outside = Outside::nearest});
+  EXPECT_FALSE(embedding.outside.empty());
+  EXPECT_LT(reproduction_error(mesh, points, embedding), 1e-12);
+  for (const OutsidePoint& outside : embedding.outside) {
+    const Vector position = points.row(outside.point).transpose();
+    // Outside the mesh the nearest of all facets is one of the boundary.
+    double best = std::numeric_limits<double>::infinity();
+    for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
+      for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
+        for (const Facet& facet : E::facets) {
+          Eigen::MatrixXd nodes(facet.num_nodes, E::dim);
+          for (int i = 0; i < facet.num_nodes; ++i) nodes.row(i) = mesh.vertices().row(block.cells(c, facet.nodes[i]));
+          best = std::min(best, sampled_distance(nodes, position));
+        }
+    });
+    // Sampling can only miss the minimum upwards; it ends at steps of 1e-10 along the facet.
+    EXPECT_LE(outside.distance, best + 1e-13);
+    EXPECT_NEAR(outside.distance, best, 1e-6);
+  }
+}
+
+TYPED_TEST(Embed, DistanceOutsideIsTheLeastOverAllFacets) {
+  // Sheared, so that no facet lies along the axes, and with every vertex moved, so that faces are warped.
+  const int gdim = TypeParam::dim;
+  Mesh mesh = test::lattice<TypeParam>(1, 0, 1);
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> uniform(-0.15, 0.15);
+  Points vertices = mesh.vertices();
+  for (double& x : vertices.reshaped()) x += uniform(random);
+  mesh = Mesh(vertices, mesh.blocks());
+  expect_sampled_distances(mesh, points_around(gdim, 60, 1, 9));
+}
+
+TEST(EmbedMixed, DistanceOutsideIsTheLeastOverAllFacets) {
+  expect_sampled_distances(test::warped_mixed_mesh(), points_around(3, 100, 1, 10));
+}
+
+TYPED_TEST(Embed, WeightsAreContinuousAcrossTheBoundary) {
+  using E = TypeParam;
+  const Mesh mesh = test::lattice<E>(1, 0, 1);
+  const Vector middle = Vector::Constant(E::dim, 0.5);
+  std::mt19937 random(11);
+  for (int i = 0; i < 200; ++i) {
+    // A point on the surface of the unit cube off the edges, seen from both sides.
+    Vector surface = points_around(E::dim, 1, -0.05, random()).row(0).transpose();
+    surface[i % E::dim] = i % 2;
+    Points points(2, E::dim);
+    points.row(0) = (surface + 1e-8 * (middle - surface)).transpose();
+    points.row(1) = (surface - 1e-8 * (middle - surface)).transpose();
+    const Embedding embedding = embed(mesh, points, {.outside = Outside::nearest, .tolerance = 1e-12});
+    ASSERT_EQ(embedding.outside.size(), 1U);
+    Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(2, mesh.num_vertices());
+    for (int p = 0; p < 2; ++p)
+      with_cell(mesh, embedding.cells[p], [&]<Element F>(const ElementBlock<F>& block, Eigen::Index row) {
+        const NodeVector<F> beta = cell_weights<F>(embedding.local.row(p).transpose().template head<F::dim>(),
+                                                   p == 0 ? nullptr : &embedding.outside[0].offset);
+        for (int n = 0; n < F::num_nodes; ++n) weights(p, block.cells(row, n)) = beta[n];
+      });
+    EXPECT_LT((weights.row(0) - weights.row(1)).cwiseAbs().maxCoeff(), 1e-6);
+  }
+}
+
+TYPED_TEST(Embed, PointsHiddenByFoldsAreNotFarOutside) {
+  // Vertices off the boundary move by more than a cell: cells fold and overlap, but they still fill the unit cube.
+  using E = TypeParam;
+  const Mesh mesh = test::lattice<E>(4, 1.2, 12);
+  const Points points = points_around(E::dim, 4000, -1e-6, 13);
+  const Embedding embedding = embed(mesh, points, {.outside = Outside::nearest});
+  // An inverse map that stops at a fold may miss its cell; simplices cannot.
+  EXPECT_LE(embedding.outside.size(), E::affine ? 0U : 40U);
+  for (const OutsidePoint& outside : embedding.outside) EXPECT_LT(outside.distance, 0.25);
+  EXPECT_LT(reproduction_error(mesh, points, embedding), 1e-10);
+}
+
 TEST(EmbedPolicies, ErrorNamesTheFirstPointAndTheWayOut) {
   const Mesh mesh = test::lattice<Tetrahedron>(2, 0.1, 1);
   Points points(3, 3);

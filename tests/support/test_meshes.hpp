@@ -148,4 +148,22 @@ inline Points random_points_inside(const Mesh& mesh, Index count, unsigned seed)
   return points;
 }
 
+/// A hexahedron with warped faces, a pyramid on its right face, and a tetrahedron on each side of the pyramid.
+inline Mesh warped_mixed_mesh() {
+  Points vertices(13, 3);
+  vertices << 0, 0, 0, 1, 0, 0, 1, 1, 0, -0.2, 1, 0.1, 0, 0.1, 1, 1, 0, 1, 1, 1, 1, 0.1, 1, 1.2,  // hexahedron
+      1.5, 0.5, 0.5,                                                                              // apex
+      1.6, 0.5, -0.2, 1.6, 0.5, 1.2, 1.6, -0.2, 0.5, 1.6, 1.2, 0.5;
+  ElementBlock<Hexahedron> hexahedra;
+  hexahedra.cells.resize(1, 8);
+  hexahedra.cells << 0, 1, 2, 3, 4, 5, 6, 7;
+  ElementBlock<Pyramid> pyramids;
+  pyramids.cells.resize(1, 5);
+  pyramids.cells << 1, 2, 6, 5, 8;
+  ElementBlock<Tetrahedron> tetrahedra;
+  tetrahedra.cells.resize(4, 4);
+  tetrahedra.cells << 1, 2, 8, 9, 5, 6, 8, 10, 1, 5, 8, 11, 2, 6, 8, 12;
+  return Mesh(vertices, {hexahedra, pyramids, tetrahedra});
+}
+
 }  // namespace halfgrad::test
