@@ -52,10 +52,14 @@ void run(const std::string& path, int rounds, std::int64_t max_points, int threa
   const Embedding embedding = embed(mesh, workload.points, nearest);
   const Reconstruction reconstruction =
       ChandrashekarGarg().reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+  // Hessians of no meaning on the same stencils: what dual_taylor costs next to phong.
+  Reconstruction with_hessians = reconstruction;
+  with_hessians.stencils.hessian_weights.assign(6 * static_cast<std::size_t>(reconstruction.stencils.num_entries()), 0);
   const auto bound = [&]<class Scalar>(Scalar, const char* rule) {
-    return Frame<Scalar>{Interpolant<Scalar>(mesh, embedding, named_rule(rule), &reconstruction), {}, {}};
+    return Frame<Scalar>{Interpolant<Scalar>(mesh, embedding, named_rule(rule), &with_hessians), {}, {}};
   };
   auto linear = bound(float(), "linear"), phong = bound(float(), "phong"), hermite = bound(float(), "hermite");
+  auto dual_taylor = bound(float(), "dual_taylor");
   auto linear_user = bound(float(), "linear"), phong_user = bound(float(), "phong");
   auto phong_double = bound(double(), "phong");
   const Values<float> values = workload.deformed.cast<float>();
@@ -69,6 +73,7 @@ void run(const std::string& path, int rounds, std::int64_t max_points, int threa
       {"linear", frames, [&] { linear.sorted(values); }},
       {"phong", frames, [&] { phong.sorted(values); }},
       {"hermite", frames, [&] { hermite.sorted(values); }},
+      {"dual_taylor", frames, [&] { dual_taylor.sorted(values); }},
       {"phong_double", frames, [&] { phong_double.sorted(workload.deformed); }},
       {"linear_user_order", frames, [&] { linear_user.user_order(values); }},
       {"phong_user_order", frames, [&] { phong_user.user_order(values); }},

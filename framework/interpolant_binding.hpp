@@ -126,6 +126,7 @@ struct Interpolant<Scalar>::Binding {
                          static_cast<double>(runs.rest[run][j][k] - runs.rest[run][i][k]);
           squared += component * component;
         }
+        if (std::isnan(squared)) return squared;
         largest = std::max(largest, squared);
       }
     return std::abs(rule.alpha) * (1 - 1.0 / E::num_nodes) / 2 * std::sqrt(largest);

@@ -291,12 +291,13 @@ HWY_INLINE void set_up_dual_taylor(const T* const* line, const T* rest, T* coeff
   for (int i = 0; i < size; ++i) c[i].store(coefficients + 4 * i);
 }
 
-// Square of the bound of the quadratic part: (1 − 1/n)/2 · max |(H_i − H_j)(X_j − X_i)| over the edges, read off the
-// coefficients: −Q_kk for the edges at node 0, Q_kl − Q_kk − Q_ll for the others.
+// Whether the quadratic part stays within `tolerance` in the cell: it is at most (1 − 1/n)/2 · |(H_i − H_j)(X_j − X_i)|
+// for the edge where that is greatest. The coefficients hold −Q_kk for the edges at node 0, Q_kl − Q_kk − Q_ll for the
+// others. A NaN is not bounded.
 template <int d, class T>
-HWY_NOINLINE T squared_bound(const T* coefficients, int num_columns) {
+HWY_NOINLINE bool is_within(T tolerance, const T* coefficients, int num_columns) {
   constexpr const auto& at = places<2, d>;
-  T largest = 0;
+  const T longest = tolerance * 2 * (d + 1) / d;
   for (int k = 0; k < d; ++k)
     for (int l = k; l < d; ++l) {
       T squared = 0;
@@ -305,11 +306,9 @@ HWY_NOINLINE T squared_bound(const T* coefficients, int num_columns) {
         if (l != k) edge -= coefficients[4 * at.quadratic[k][k] + c] + coefficients[4 * at.quadratic[l][l] + c];
         squared += edge * edge;
       }
-      // Not std::max, which would drop a NaN.
-      if (!(squared <= largest)) largest = squared;
+      if (!(squared <= longest * longest)) return false;
     }
-  const T factor = (1 - T(1) / (d + 1)) / 2;
-  return factor * factor * largest;
+  return true;
 }
 
 // ---- evaluation of a run
@@ -432,7 +431,7 @@ void evaluate_runs(const PointStage<T>& stage, Index begin, Index end) {
         set_up_quadratic<d>(line, rest, target);
         if (stage.tolerance > 0) {
           const bool inside = stage.extrapolates == nullptr || stage.extrapolates[run] == 0;
-          is_linear[run - batch] = inside && squared_bound<d>(target, columns) <= stage.tolerance * stage.tolerance;
+          is_linear[run - batch] = inside && is_within<d>(stage.tolerance, target, columns);
           if (is_linear[run - batch]) set_up_linear<d>(line, target);
         }
       }

@@ -185,6 +185,16 @@ TEST_F(TetrahedraWithMixedPoints, ANaNSpoilsOnlyTheCellsThatSeeIt) {
   on_every_target([&] { EXPECT_LT(largest_difference(phong.evaluate(values), expected), 1e-5); });
 }
 
+TEST_F(TetrahedraWithMixedPoints, NoToleranceBoundsANaN) {
+  // The gradients of the vertices around are NaN, their own values are not: their cells must not become linear.
+  values(0, 1) = std::numeric_limits<float>::quiet_NaN();
+  const Values<double> expected = phong.evaluate(values).cast<double>();
+  for (Kernel kernel : {Kernel::fast, Kernel::plain}) {
+    const Values<float> result = phong.evaluate(values, {.tolerance = 100, .kernel = kernel});
+    EXPECT_LT(largest_difference(result, expected), 100);
+  }
+}
+
 TEST_F(TetrahedraWithMixedPoints, ToleranceKeepsItsBoundOnEveryTarget) {
   const Values<double> full = phong.evaluate(values).cast<double>();
   for (float tolerance : {1e-3f, 0.05f, 0.1f, 0.3f}) {
