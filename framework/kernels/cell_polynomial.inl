@@ -70,35 +70,42 @@ struct Four {
 
   HWY_INLINE static Four zero() {
     Four r;
+    HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Zero(Tag());
     return r;
   }
   HWY_INLINE static Four load(const T* from) {
     Four r;
+    HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Load(Tag(), from + p * lanes);
     return r;
   }
   HWY_INLINE void store(T* to) const {
+    HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) hn::Store(part[p], Tag(), to + p * lanes);
   }
   // this + other · factor
   HWY_INLINE Four plus(const Four& other, T factor) const {
     Four r;
+    HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::MulAdd(other.part[p], hn::Set(Tag(), factor), part[p]);
     return r;
   }
   HWY_INLINE Four operator+(const Four& other) const {
     Four r;
+    HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Add(part[p], other.part[p]);
     return r;
   }
   HWY_INLINE Four operator-(const Four& other) const {
     Four r;
+    HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Sub(part[p], other.part[p]);
     return r;
   }
   HWY_INLINE Four operator*(T factor) const {
     Four r;
+    HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Mul(part[p], hn::Set(Tag(), factor));
     return r;
   }
@@ -112,15 +119,18 @@ void vertex_lines(const VertexStage<T>& stage, Index begin, Index end) {
   for (Index row = begin; row < end; ++row) {
     const F own = F::load(stage.positions + 4 * static_cast<Offset>(row));
     F sum[width];
+    HALFGRAD_UNROLL
     for (int k = 0; k < width; ++k) sum[k] = F::zero();
     // Positions are padded with zeros: no lane ever holds a denormal or a foreign number.
     for (Offset e = stage.offsets[row]; e < stage.offsets[row + 1]; ++e) {
       const F difference = F::load(stage.positions + 4 * static_cast<Offset>(stage.neighbors[e])) - own;
       const T* weight = stage.weights + e * width;
+      HALFGRAD_UNROLL
       for (int k = 0; k < width; ++k) sum[k] = sum[k].plus(difference, weight[k]);
     }
     T* line = stage.lines + static_cast<Offset>(row) * 4 * (1 + width);
     own.store(line);
+    HALFGRAD_UNROLL
     for (int k = 0; k < width; ++k) (sum[k] * stage.scale[static_cast<std::size_t>(k)]).store(line + 4 * (1 + k));
   }
 }
@@ -225,6 +235,7 @@ HWY_INLINE void set_up_hermite(const T* const* line, const T* rest, T* coefficie
     HALFGRAD_UNROLL
     for (int l = k + 1; l < d; ++l) {
       T edge[d];
+      HALFGRAD_UNROLL
       for (int a = 0; a < d; ++a) edge[a] = rest[(l + 1) * d + a] - rest[(k + 1) * d + a];
       const F at_first = product<d>(h[k + 1], edge), at_second = product<d>(h[l + 1], edge);
       const F t = x[k + 1] - x[l + 1] + at_first + at_second;
@@ -262,17 +273,21 @@ HWY_INLINE void set_up_dual_taylor(const T* const* line, const T* rest, T* coeff
   HALFGRAD_UNROLL
   for (int node = 0; node <= d; ++node) {
     F h[d], q[symmetric], p[d], w[d][d];
+    HALFGRAD_UNROLL
     for (int a = 0; a < d; ++a) h[a] = F::load(line[node] + 4 * (1 + a));
     for (int a = 0; a < symmetric; ++a) q[a] = F::load(line[node] + 4 * (1 + d + a));
     for (int k = 0; k < d; ++k) {
       p[k] = product<d>(h, rest + (k + 1) * d);
+      HALFGRAD_UNROLL
       for (int l = k; l < d; ++l) w[k][l] = w[l][k] = product<symmetric>(q, pair[k][l]);
     }
     if (node == 0) {
       c[0] = x0;
+      HALFGRAD_UNROLL
       for (int k = 0; k < d; ++k) {
         p0[k] = p[k];
         c[at.linear[k]] = p[k] - x0;
+        HALFGRAD_UNROLL
         for (int l = 0; l < d; ++l) {
           w0[k][l] = w[k][l];
           c[at.quadratic[k][l]] = c[at.quadratic[k][l]] + w[k][l];
@@ -282,8 +297,10 @@ HWY_INLINE void set_up_dual_taylor(const T* const* line, const T* rest, T* coeff
     }
     const int m = node - 1;
     c[at.linear[m]] = c[at.linear[m]] + (F::load(line[node]) - p[m] + w[m][m]);
+    HALFGRAD_UNROLL
     for (int k = 0; k < d; ++k) {
       c[at.quadratic[m][k]] = c[at.quadratic[m][k]] + (p[k] - w[m][k] - w[m][k] - p0[k]);
+      HALFGRAD_UNROLL
       for (int l = 0; l < d; ++l) c[at.cubic[m][k][l]] = c[at.cubic[m][k][l]] + (w[k][l] - w0[k][l]);
     }
   }
@@ -390,6 +407,7 @@ HWY_INLINE void evaluate_run(const T* coefficients, const T* local, Index count,
   constexpr int lanes = static_cast<int>(hn::MaxLanes(tag));
   for (Index p = 0; p < count; p += lanes, out += lanes * columns) {
     V b[d], v[computed];
+    HALFGRAD_UNROLL
     for (int k = 0; k < d; ++k) b[k] = hn::LoadU(tag, local + static_cast<Offset>(k) * count + p);
     for (int c = 0; c < computed; ++c) v[c] = horner<degree, d, 0>(tag, coefficients + c, b);
     if (HWY_LIKELY(limit - out >= lanes * columns)) {
@@ -417,6 +435,7 @@ void evaluate_runs(const PointStage<T>& stage, Index begin, Index end) {
     const Index batch_end = std::min(batch + batch_size, end);
     for (Index run = batch; run < batch_end; ++run) {
       const T* line[d + 1];
+      HALFGRAD_UNROLL
       for (int i = 0; i <= d; ++i)
         line[i] = stage.lines + stage.nodes[static_cast<Offset>(run) * (d + 1) + i] * line_length;
       T* const target = coefficients + (run - batch) * stride;
