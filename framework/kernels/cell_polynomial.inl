@@ -257,14 +257,20 @@ HWY_INLINE void set_up_dual_taylor(const T* const* line, const T* rest, T* coeff
   constexpr int size = num_coefficients(3, d), symmetric = num_symmetric(d);
   // Q : E_k E_lᵀ as coefficients of the entries of Q, of which those off the diagonal count twice already.
   T pair[d][d][symmetric];
-  for (int k = 0; k < d; ++k)
-    for (int l = 0; l < d; ++l)
-      for (int a = 0, entry = 0; a < d; ++a)
-        for (int b = a; b < d; ++b, ++entry) {
-          const T* e = rest + (k + 1) * d;
-          const T* f = rest + (l + 1) * d;
-          pair[k][l][entry] = (e[a] * f[b] + e[b] * f[a]) / 2;
-        }
+  HALFGRAD_UNROLL
+  for (int k = 0; k < d; ++k) {
+    HALFGRAD_UNROLL
+    for (int l = k; l < d; ++l) {
+      const T* e = rest + (k + 1) * d;
+      const T* f = rest + (l + 1) * d;
+      int entry = 0;
+      HALFGRAD_UNROLL
+      for (int a = 0; a < d; ++a) {
+        HALFGRAD_UNROLL
+        for (int b = a; b < d; ++b) pair[k][l][entry++] = (e[a] * f[b] + e[b] * f[a]) / 2;
+      }
+    }
+  }
   F c[size];
   HALFGRAD_UNROLL
   for (int i = 0; i < size; ++i) c[i] = F::zero();
@@ -275,7 +281,9 @@ HWY_INLINE void set_up_dual_taylor(const T* const* line, const T* rest, T* coeff
     F h[d], q[symmetric], p[d], w[d][d];
     HALFGRAD_UNROLL
     for (int a = 0; a < d; ++a) h[a] = F::load(line[node] + 4 * (1 + a));
+    HALFGRAD_UNROLL
     for (int a = 0; a < symmetric; ++a) q[a] = F::load(line[node] + 4 * (1 + d + a));
+    HALFGRAD_UNROLL
     for (int k = 0; k < d; ++k) {
       p[k] = product<d>(h, rest + (k + 1) * d);
       HALFGRAD_UNROLL
