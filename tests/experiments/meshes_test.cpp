@@ -40,7 +40,9 @@ TEST(Lattice, EveryPatternFillsTheBoxRegularOrNot) {
         expect_valid(mesh);
         const double volume = 2;
         // Hexahedra with warped faces: the midpoint rule is off by the warp squared.
-        EXPECT_NEAR(inspect(mesh).volume, volume, element == "hexahedron" && irregular ? 1e-2 : 1e-12);
+        // Sides of jittered cells are curved; their volume comes from one point or is not the box's.
+        const bool curved_sides = element == "hexahedron" || element == "wedge" || element == "pyramid";
+        EXPECT_NEAR(inspect(mesh).volume, volume, curved_sides && irregular ? 1e-2 : 1e-12);
         EXPECT_EQ(mesh.vertices().colwise().minCoeff().norm(), 0);
         EXPECT_EQ(mesh.vertices().col(0).maxCoeff(), 2);
       }
