@@ -39,8 +39,7 @@ TEST(Lattice, EveryPatternFillsTheBoxRegularOrNot) {
         const Mesh mesh = make_lattice(options);
         expect_valid(mesh);
         const double volume = 2;
-        // Hexahedra with warped faces: the midpoint rule is off by the warp squared.
-        // Sides of jittered cells are curved; their volume comes from one point or is not the box's.
+        // Quadrilateral faces are warped by jitter: the midpoint rule is off by the warp squared.
         const bool curved_sides = element == "hexahedron" || element == "wedge" || element == "pyramid";
         EXPECT_NEAR(inspect(mesh).volume, volume, curved_sides && irregular ? 1e-2 : 1e-12);
         EXPECT_EQ(mesh.vertices().colwise().minCoeff().norm(), 0);
