@@ -58,7 +58,8 @@ struct KnnOptions {
   double epsilon = 1;  ///< as in chandrashekar_garg
 };
 
-/// The same weights over the adjacent cells and the k further cells whose centroids are nearest (James 2020, §4).
+/// The same weights over the adjacent cells and the k further cells whose centroids are nearest, and those that
+/// tie with the k-th (James 2020, §4).
 class Knn final : public CellAverage {
  public:
   explicit Knn(const KnnOptions& options = {});

@@ -89,8 +89,8 @@ void orthogonalize_columns(Block& a, SmallSquare& v) {
         if (!(std::abs(pq) > 1e-14 * std::sqrt(pp * qq)) || std::min(pp, qq) <= negligible) continue;
         rotated = true;
         const double zeta = (qq - pp) / (2 * pq);
-        const double t = (zeta < 0 ? -1 : 1) / (std::abs(zeta) + std::hypot(1.0, zeta));
-        const double c = 1 / std::hypot(1.0, t), s = c * t;
+        const double t = (zeta < 0 ? -1 : 1) / (std::abs(zeta) + std::sqrt(1 + zeta * zeta));
+        const double c = 1 / std::sqrt(1 + t * t), s = c * t;
         const auto rotate = [&](double* x, double* y, Eigen::Index count) {
           for (Eigen::Index i = 0; i < count; ++i) {
             const double old = x[i];

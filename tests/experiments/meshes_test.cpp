@@ -39,8 +39,9 @@ TEST(Lattice, EveryPatternFillsTheBoxRegularOrNot) {
         const Mesh mesh = make_lattice(options);
         expect_valid(mesh);
         const double volume = 2;
-        // Hexahedra with warped faces: the midpoint rule is off by the warp squared.
-        EXPECT_NEAR(inspect(mesh).volume, volume, element == "hexahedron" && irregular ? 1e-2 : 1e-12);
+        // Quadrilateral faces are warped by jitter: the midpoint rule is off by the warp squared.
+        const bool curved_sides = element == "hexahedron" || element == "wedge" || element == "pyramid";
+        EXPECT_NEAR(inspect(mesh).volume, volume, curved_sides && irregular ? 1e-2 : 1e-12);
         EXPECT_EQ(mesh.vertices().colwise().minCoeff().norm(), 0);
         EXPECT_EQ(mesh.vertices().col(0).maxCoeff(), 2);
       }
