@@ -39,8 +39,11 @@ class Stopwatch {
   json seconds_ = json::object();
 };
 
-json parse_reconstructor(const std::string& text) {
-  if (text.empty() || (text[0] != '{' && text[0] != '"')) return text;
+// Where the user names none: the rule that was measured to be safe on every kind of data (docs/adaptive.md), and the
+// one that gives Hessians where they are needed.
+json parse_reconstructor(const std::string& text, const InterpolationRule& rule) {
+  if (text.empty()) return rule.needs_hessians() ? json{{"kriging", {{"drift", "cubic"}}}} : json("adaptive");
+  if ((text[0] != '{' && text[0] != '"')) return text;
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
@@ -194,7 +197,7 @@ json run_frames(const DeformOptions& options, const Mesh& mesh, const Embedding&
 void deform(const DeformOptions& options) {
   Stopwatch watch;
   const InterpolationRule rule = parse_rule(options);
-  const json specification = parse_reconstructor(options.reconstructor);
+  const json specification = parse_reconstructor(options.reconstructor, rule);
   if (options.precision != "float" && options.precision != "double")
     raise("--precision {}: expected float or double", options.precision);
   if (!(options.tolerance >= 0)) raise("--tolerance {}: expected a length >= 0", options.tolerance);

@@ -14,7 +14,7 @@ struct DeformOptions {
   std::string frames;
   std::string interpolant = "phong";
   std::optional<double> alpha;
-  std::string reconstructor = "chandrashekar_garg";  ///< a name or JSON
+  std::string reconstructor;  ///< a name or JSON; empty: adaptive, or for dual_taylor kriging with cubic drift
   std::string outside = "error";
   double tolerance = 0;
   bool normals = false, gradients = false;

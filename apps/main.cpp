@@ -102,8 +102,9 @@ int dispatch(int argc, char** argv) {
       deform_app->add_option("--interpolant", options.interpolant, "See halfgrad list interpolants")
           ->capture_default_str();
   deform_app->add_option("--alpha", options.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
-  deform_app->add_option("--reconstructor", options.reconstructor, "A name or JSON; see halfgrad list reconstructors")
-      ->capture_default_str();
+  deform_app->add_option("--reconstructor", options.reconstructor,
+                         "A name or JSON; see halfgrad list reconstructors (default: adaptive; for dual_taylor kriging "
+                         "with cubic drift)");
   deform_app->add_option("--outside", options.outside, "Points outside the mesh: error, nearest or mark")
       ->capture_default_str();
   deform_app
