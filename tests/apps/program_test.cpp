@@ -196,10 +196,17 @@ TEST_F(Program, NormalsTurnWithTheSurface) {
   const Values<double> before = frame("out.normals.npy", 0);
   EXPECT_LT((before.rowwise().norm().array() - 1).abs().maxCoeff(), 1e-14);
   EXPECT_LT((frame("out.normals.npy", 1) - rotated(before)).norm(), 1e-13);
-  // The first frame is the rest state: F = I.
-  const Values<double> gradients = frame("out.gradients.npy", 0);
-  for (Eigen::Index p = 0; p < gradients.rows(); ++p)
-    EXPECT_LT((Eigen::Map<const Eigen::Matrix3d>(gradients.row(p).data()) - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+  // The first frame is the rest state: F = I. Frames of nine columns are no positions, so the numbers are read plainly.
+  constexpr std::size_t num_numbers = 3 * 4 * 9;
+  const std::filesystem::path path = directory / "out.gradients.npy";
+  ASSERT_GT(std::filesystem::file_size(path), num_numbers * sizeof(double));
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(std::filesystem::file_size(path) - num_numbers * sizeof(double)));
+  std::array<double, 4 * 9> gradients;
+  file.read(reinterpret_cast<char*>(gradients.data()), sizeof gradients);
+  for (int p = 0; p < 4; ++p)
+    EXPECT_LT((Eigen::Map<const Eigen::Matrix3d>(gradients.data() + 9 * p) - Eigen::Matrix3d::Identity()).norm(),
+              1e-12);
   ASSERT_EQ(deform("--normals", "with.pvd").status, 0);
   EXPECT_FALSE(std::filesystem::exists(in("with.normals.npy")));
 }
@@ -306,13 +313,11 @@ TEST_F(Program, RunExitsWith3WhereAnExpectationFails) {
   json config = {{"name", "small"},
                  {"mesh", {{"lattice", {{"element", "triangle"}, {"cells", 4}}}, {"refinements", 2}}},
                  {"points", {{"random", {{"count", 200}}}}},
-                 {"field", {{"bend_twist", json::object()}}},
+                 {"field", {{"waves", json::object()}}},
                  {"interpolants", {"linear"}},
-                 {"reconstructors", json::array()},
                  {"expect", {{{"interpolant", "linear"}, {"order_at_least", 1.5}}}},
                  {"outputs", {"json"}}};
   const auto write = [&] { std::ofstream(in("config.json")) << config.dump(); };
-  config["field"] = {{"waves", json::object()}};
   write();
   const std::string command = "run " + in("config.json") + " --out " + in("results");
   const Outcome good = run_program(command);
