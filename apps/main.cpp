@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
@@ -89,38 +90,60 @@ int dispatch(int argc, char** argv) {
   check_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")->take_all();
   check_app->footer("Example: halfgrad check configs/quickstart.json");
 
+  const auto add_bind_options = [](CLI::App* app, BindOptions& bind) {
+    app->add_option("--rest", bind.rest, "Rest mesh: .msh .vtk .vtu .mesh .node/.ele");
+    app->add_option("--points", bind.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy");
+    app->add_option("--interpolant", bind.interpolant, "See halfgrad list interpolants (default: phong)");
+    app->add_option("--alpha", bind.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
+    app->add_option("--reconstructor", bind.reconstructor,
+                    "A name or JSON; see halfgrad list reconstructors (default: adaptive; for dual_taylor kriging "
+                    "with cubic drift)");
+    app->add_option("--outside", bind.outside, "Points outside the mesh: error, nearest or mark (default: error)");
+  };
   DeformOptions options;
   CLI::App* deform_app = program.add_subcommand("deform", "Carry points through a sequence");
-  deform_app->add_option("--rest", options.rest, "Rest mesh: .msh .vtk .vtu .mesh .node/.ele")->required();
+  add_bind_options(deform_app, options.bind);
+  deform_app->add_option("--binding", options.bind.binding,
+                         "In place of --rest and --points: what halfgrad bind wrote");
   deform_app
       ->add_option("--frames", options.frames,
                    "Deformed vertices: .npy .pc2 .pvd, or a pattern of files (x.%04d.vtu, frames/*.vtu)")
       ->required();
-  deform_app->add_option("--points", options.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy")->required();
   deform_app->add_option("--out", options.out, "Output: .npy .pc2 .obj (name.%04d.obj) .pvd")->required();
-  CLI::Option* interpolant =
-      deform_app->add_option("--interpolant", options.interpolant, "See halfgrad list interpolants")
-          ->capture_default_str();
-  deform_app->add_option("--alpha", options.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
-  deform_app->add_option("--reconstructor", options.reconstructor,
-                         "A name or JSON; see halfgrad list reconstructors (default: adaptive; for dual_taylor kriging "
-                         "with cubic drift)");
-  deform_app->add_option("--outside", options.outside, "Points outside the mesh: error, nearest or mark")
-      ->capture_default_str();
   deform_app
       ->add_option("--tolerance", options.tolerance,
                    "Length: cells that differ from linear by less are evaluated linearly")
       ->capture_default_str();
-  deform_app->add_flag("--normals", options.normals, "Also carry the surface's normals");
+  deform_app
+      ->add_option("--normals", options.normals,
+                   "Also carry the surface's normals: gradient (of the map, default) or smooth (across cells)")
+      ->expected(0, 1)
+      ->default_str("gradient");
   deform_app->add_flag("--gradients", options.gradients, "Also write deformation gradients at the points");
+  deform_app->add_flag("--stretch", options.stretch, "Also write principal stretches at the points");
+  deform_app
+      ->add_option("--field", options.fields,
+                   "Also carry a field of the vertices: NAME of point data in the frame files or the rest mesh, or "
+                   "NAME=FILE.npy")
+      ->take_all();
   deform_app->add_option("--precision", options.precision, "float or double")->capture_default_str();
   deform_app->add_option("--first", options.first, "First frame, from 0")->capture_default_str();
   deform_app->add_option("--last", options.last, "Last frame (default: the last one)")->check(CLI::NonNegativeNumber);
   deform_app->add_option("--step", options.step, "Take every step-th frame")->capture_default_str();
+  deform_app->add_flag("--resume", options.resume, "Go on behind the frames that the same command left");
   deform_app->add_option("--report", options.report, "Write times, counts and points outside as JSON");
   deform_app->footer(
       "Example: halfgrad deform --rest cage.msh --frames sim.npy --points render.obj --out render.pc2 --precision "
       "float");
+
+  BindOptions bind;
+  std::filesystem::path binding;
+  CLI::App* bind_app = program.add_subcommand("bind", "Locate points once and save that for many runs of deform");
+  add_bind_options(bind_app, bind);
+  bind_app->add_option("--out", binding, "Output: .hgb")->required();
+  bind_app->footer(
+      "Example: halfgrad bind --rest cage.msh --points render.obj --out render.hgb\n"
+      "         halfgrad deform --binding render.hgb --frames shot12.npy --out shot12.pc2");
 
   std::string what;
   bool as_json = false;
@@ -151,10 +174,13 @@ int dispatch(int argc, char** argv) {
     return run(command, mode, quiet);
   }
   if (deform_app->parsed()) {
-    if (options.alpha && interpolant->count() == 0) options.interpolant = "vertex_blend";
     options.progress = mode;
     options.quiet = quiet;
     deform(options);
+    return all_well;
+  }
+  if (bind_app->parsed()) {
+    save_binding(bind, binding, quiet);
     return all_well;
   }
   if (list_app->parsed()) {
@@ -177,6 +203,12 @@ int main(int argc, char** argv) {
   } catch (const halfgrad::Error& error) {
     fmt::print(stderr, "halfgrad: {}\n", error.what());
     return bad_input;
+  } catch (const halfgrad::app::Interrupted& interrupted) {
+    fmt::print(stderr, "halfgrad: {}\n", interrupted.what());
+    // Ends as the signal would have, so that shells and queues see it.
+    std::signal(interrupted.signal, SIG_DFL);
+    std::raise(interrupted.signal);
+    return internal_failure;
   } catch (const std::exception& error) {
     fmt::print(stderr, "halfgrad: internal failure: {}\n", error.what());
     return internal_failure;

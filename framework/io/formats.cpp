@@ -89,8 +89,9 @@ const Format& find_format(const std::filesystem::path& path, FormatUse use) {
         known_as.empty() && !extension.empty() && !nearest.empty() ? fmt::format("; did you mean {}?", nearest) : "");
 }
 
-std::unique_ptr<FrameSink> create_frames(const std::filesystem::path& path, const PointSet& shape) {
-  return find_format(path, FormatUse::create_frames).create_frames(path, shape);
+std::unique_ptr<FrameSink> create_frames(const std::filesystem::path& path, const PointSet& shape,
+                                         const FrameSinkOptions& options) {
+  return find_format(path, FormatUse::create_frames).create_frames(path, shape, options);
 }
 
 }  // namespace halfgrad

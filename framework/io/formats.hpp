@@ -20,7 +20,7 @@ struct Format {
   bool has_cells;                            ///< read() gives cells that make a mesh
   Geometry (*read)(const std::filesystem::path&);
   std::unique_ptr<FrameSource> (*open_frames)(const std::filesystem::path&);
-  std::unique_ptr<FrameSink> (*create_frames)(const std::filesystem::path&, const PointSet&);
+  std::unique_ptr<FrameSink> (*create_frames)(const std::filesystem::path&, const PointSet&, const FrameSinkOptions&);
 };
 
 const std::vector<Format>& formats();

@@ -86,6 +86,12 @@ AnyBlock build_block(const Geometry& geometry, int vtk_id, Index num_cells) {
 
 }  // namespace
 
+const PointArray* find_array(std::span<const PointArray> arrays, std::string_view name) {
+  const auto found =
+      std::find_if(arrays.begin(), arrays.end(), [&](const PointArray& array) { return array.name == name; });
+  return found == arrays.end() ? nullptr : &*found;
+}
+
 const CellType* find_cell_type(int vtk_id) {
   static const std::vector<CellType> types = cell_types();
   const auto found =
@@ -168,7 +174,7 @@ PointSet build_point_set(Geometry geometry) {
     set.faces.offsets.push_back(static_cast<Offset>(set.faces.entries.size()));
   }
   set.points = std::move(geometry.vertices);
-  set.displacement = std::move(geometry.displacement);
+  set.arrays = std::move(geometry.arrays);
   set.obj_text = std::move(geometry.obj_text);
   return set;
 }

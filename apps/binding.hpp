@@ -1,0 +1,60 @@
+// Points bound to a mesh under the options that all commands share.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "framework/embedding.hpp"
+#include "framework/gradient_stencils.hpp"
+#include "framework/interpolation_rule.hpp"
+#include "framework/io/point_set.hpp"
+
+namespace halfgrad::app {
+
+/// The options of `deform`, `bind` and `export` that decide a binding.
+struct BindOptions {
+  std::filesystem::path rest, points;
+  std::filesystem::path binding;  ///< a saved binding; it fills in what the others leave open
+  std::optional<std::string> interpolant;
+  std::optional<double> alpha;
+  std::string reconstructor;  ///< a name or JSON; empty: adaptive, or for dual_taylor kriging with cubic drift
+  std::optional<std::string> outside;
+};
+
+/// Options read and checked, before any large file is opened.
+struct BindSettings {
+  std::filesystem::path rest, points, binding;
+  std::string interpolant, outside;
+  InterpolationRule rule;
+  std::string reconstructor, reconstructor_options;  ///< name and compact JSON object
+  std::string specification;                         ///< JSON that make_reconstructor reads
+
+  std::string to_json() const;
+};
+
+/// Throws Error on unknown names and values, and on options that contradict the saved binding.
+BindSettings parse_settings(const BindOptions& options);
+
+/// What binding took and gave.
+struct Binding {
+  Mesh mesh;
+  MeshReport quality;
+  PointSet surface;
+  Points points;  ///< of the surface, in the mesh's dimension
+  std::string fingerprint;
+  Embedding embedding;
+  std::optional<Reconstruction> reconstruction;
+};
+
+/// Reads the rest mesh and the points. Throws Error on degenerate cells.
+Binding read_inputs(const BindSettings& settings);
+/// Locates the points, or takes them from the saved binding.
+void locate(const BindSettings& settings, Binding& binding);
+/// Reconstructs gradients at the vertices that the points need, unless the saved binding has them.
+void reconstruct(const BindSettings& settings, Binding& binding);
+
+/// Runs `halfgrad bind`.
+void save_binding(const BindOptions& options, const std::filesystem::path& out, bool quiet);
+
+}  // namespace halfgrad::app
