@@ -8,8 +8,10 @@
 #include <memory>
 
 #include "apps/deform.hpp"
+#include "apps/deform_scattered.hpp"
 #include "apps/listings.hpp"
 #include "experiments/experiment.hpp"
+#include "experiments/merged_report.hpp"
 #include "framework/error.hpp"
 #include "framework/version.hpp"
 
@@ -98,9 +100,10 @@ int dispatch(int argc, char** argv) {
       ->required();
   deform_app->add_option("--points", options.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy")->required();
   deform_app->add_option("--out", options.out, "Output: .npy .pc2 .obj (name.%04d.obj) .pvd")->required();
-  CLI::Option* interpolant =
-      deform_app->add_option("--interpolant", options.interpolant, "See halfgrad list interpolants")
-          ->capture_default_str();
+  CLI::Option* interpolant = deform_app
+                                 ->add_option("--interpolant", options.interpolant,
+                                              "A name, or JSON with options; see halfgrad list interpolants")
+                                 ->capture_default_str();
   deform_app->add_option("--alpha", options.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
   deform_app->add_option("--reconstructor", options.reconstructor,
                          "A name or JSON; see halfgrad list reconstructors (default: adaptive; for dual_taylor kriging "
@@ -121,6 +124,13 @@ int dispatch(int argc, char** argv) {
   deform_app->footer(
       "Example: halfgrad deform --rest cage.msh --frames sim.npy --points render.obj --out render.pc2 --precision "
       "float");
+
+  std::vector<std::filesystem::path> result_folders;
+  std::filesystem::path report_file = "report.html";
+  CLI::App* report_app = program.add_subcommand("report", "Show the results of several runs in one page");
+  report_app->add_option("folders", result_folders, "Folders that halfgrad run wrote")->required();
+  report_app->add_option("--out", report_file, "The page, HTML")->capture_default_str();
+  report_app->footer("Example: halfgrad report out/lattice out/jittered --out out/both.html");
 
   std::string what;
   bool as_json = false;
@@ -154,7 +164,15 @@ int dispatch(int argc, char** argv) {
     if (options.alpha && interpolant->count() == 0) options.interpolant = "vertex_blend";
     options.progress = mode;
     options.quiet = quiet;
-    deform(options);
+    if (is_scattered(options.interpolant))
+      deform_scattered(options);
+    else
+      deform(options);
+    return all_well;
+  }
+  if (report_app->parsed()) {
+    write_merged_report(result_folders, report_file);
+    if (!quiet) fmt::print("written: {}\n", report_file.string());
     return all_well;
   }
   if (list_app->parsed()) {
