@@ -2,7 +2,7 @@
 # Sourced by quickstart, run-tests and .ci/run.
 
 build_packages=(g++ cmake ninja-build libeigen3-dev libfmt-dev nlohmann-json3-dev libtbb-dev libhwy-dev
-  libfast-float-dev libpugixml-dev zlib1g-dev libcli11-dev)
+  libfast-float-dev libpugixml-dev zlib1g-dev libcli11-dev libnanoflann-dev)
 test_packages=(libgtest-dev libgmock-dev)
 check_packages=(clang-format)
 

@@ -9,8 +9,10 @@
 #include <memory>
 
 #include "apps/deform.hpp"
+#include "apps/deform_scattered.hpp"
 #include "apps/listings.hpp"
 #include "experiments/experiment.hpp"
+#include "experiments/merged_report.hpp"
 #include "framework/error.hpp"
 #include "framework/version.hpp"
 
@@ -93,7 +95,8 @@ int dispatch(int argc, char** argv) {
   const auto add_bind_options = [](CLI::App* app, BindOptions& bind) {
     app->add_option("--rest", bind.rest, "Rest mesh: .msh .vtk .vtu .mesh .node/.ele");
     app->add_option("--points", bind.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy");
-    app->add_option("--interpolant", bind.interpolant, "See halfgrad list interpolants (default: phong)");
+    app->add_option("--interpolant", bind.interpolant,
+                    "A name, or JSON with options; see halfgrad list interpolants (default: phong)");
     app->add_option("--alpha", bind.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
     app->add_option("--reconstructor", bind.reconstructor,
                     "A name or JSON; see halfgrad list reconstructors (default: adaptive; for dual_taylor kriging "
@@ -145,6 +148,13 @@ int dispatch(int argc, char** argv) {
       "Example: halfgrad bind --rest cage.msh --points render.obj --out render.hgb\n"
       "         halfgrad deform --binding render.hgb --frames shot12.npy --out shot12.pc2");
 
+  std::vector<std::filesystem::path> result_folders;
+  std::filesystem::path report_file = "report.html";
+  CLI::App* report_app = program.add_subcommand("report", "Show the results of several runs in one page");
+  report_app->add_option("folders", result_folders, "Folders that halfgrad run wrote")->required();
+  report_app->add_option("--out", report_file, "The page, HTML")->capture_default_str();
+  report_app->footer("Example: halfgrad report out/lattice out/jittered --out out/both.html");
+
   std::string what;
   bool as_json = false;
   CLI::App* list_app = program.add_subcommand("list", "List elements, reconstructors, interpolants, fields");
@@ -176,7 +186,15 @@ int dispatch(int argc, char** argv) {
   if (deform_app->parsed()) {
     options.progress = mode;
     options.quiet = quiet;
-    deform(options);
+    if (is_scattered(options.bind.interpolant.value_or("phong")))
+      deform_scattered(options);
+    else
+      deform(options);
+    return all_well;
+  }
+  if (report_app->parsed()) {
+    write_merged_report(result_folders, report_file);
+    if (!quiet) fmt::print("written: {}\n", report_file.string());
     return all_well;
   }
   if (bind_app->parsed()) {

@@ -8,7 +8,10 @@
 
 #include "experiments/experiment_config.hpp"
 #include "experiments/html_report.hpp"
+#include "experiments/interactive_report.hpp"
 #include "experiments/report.hpp"
+#include "experiments/scene.hpp"
+#include "experiments/sequence_writer.hpp"
 #include "framework/error.hpp"
 #include "framework/io/frame_source.hpp"
 #include "reconstruction/cell_averages.hpp"
@@ -34,8 +37,9 @@ class FrameSequence {
  public:
   FrameSequence(const ExperimentConfig& config, const Mesh& mesh, const Points& points, int level)
       : config_(config), mesh_(mesh), points_(points) {
-    if (config.field) {
-      numbers_ = {0};
+    if (!config.files) {
+      numbers_.resize(config.fields.size());
+      std::iota(numbers_.begin(), numbers_.end(), 0);
       return;
     }
     frames_ = open_frames(config.files->frames[level].string());
@@ -63,9 +67,9 @@ class FrameSequence {
   const std::vector<int>& numbers() const { return numbers_; }
 
   void read(int frame, Points& values, Points& truth) {
-    if (config_.field) {
-      values = field_values(*config_.field, mesh_.vertices());
-      truth = field_values(*config_.field, points_);
+    if (!config_.files) {
+      values = field_values(*config_.fields[frame], mesh_.vertices());
+      truth = field_values(*config_.fields[frame], points_);
     } else {
       frames_->read(frame, values);
       truth_->read(frame, truth);
@@ -82,22 +86,23 @@ class FrameSequence {
 
 /// An interpolant bound with a reconstructor, and what bind tells of it.
 struct BoundRule {
-  Interpolant<double> interpolant;
+  std::optional<Interpolant<double>> interpolant;  ///< none for rules that know vertices only
+  std::optional<ScatteredTransfer> scattered = std::nullopt;
   bool is_exact = false;
   ResultRow facts;  ///< what is the same for all frames
 };
 
-/// √mean (n w' − 1)² over the cells of all vertices: 0 for equal weights, large where weights are fitted to noise.
-std::optional<double> weight_spread(const VertexGradientReconstructor& reconstructor, const CellGradients& cells,
-                                    const std::vector<Index>& vertices) {
+/// James 2020, Fig. 6: σ = √(Σ (w'_k − 1)² / n) over the cells of all vertices. Weights sum to one at each vertex, so
+/// that σ is a little below 1 for harmless weights, and large where they are fitted to noise.
+std::optional<double> weight_deviation(const VertexGradientReconstructor& reconstructor, const CellGradients& cells,
+                                       const std::vector<Index>& vertices) {
   const auto* average = dynamic_cast<const CellAverage*>(&reconstructor);
   if (average == nullptr) return std::nullopt;
   double sum = 0;
   std::size_t count = 0;
   for (const Index vertex : vertices) {
     const CellWeights weights = average->weights(cells, vertex);
-    const double n = static_cast<double>(weights.weights.size());
-    for (const double weight : weights.weights) sum += (n * weight - 1) * (n * weight - 1);
+    for (const double weight : weights.weights) sum += (weight - 1) * (weight - 1);
     count += weights.weights.size();
   }
   if (count == 0) return std::nullopt;
@@ -140,6 +145,14 @@ std::string element_names(const Mesh& mesh) {
   return names;
 }
 
+/// What a level gives besides its rows, where asked for.
+struct LevelOutputs {
+  LevelPicture* picture = nullptr;
+  std::string* scene = nullptr;                ///< JSON for the interactive report
+  std::filesystem::path sequence_folder = {};  ///< for every rule's deformed points
+  std::vector<std::string> files = {};         ///< written into it
+};
+
 /// One level of one configuration.
 class LevelRun {
  public:
@@ -150,24 +163,37 @@ class LevelRun {
         mesh_(config.mesh.make(level)),
         cloud_(config.points(mesh_, config.mesh.is_zoom ? 0 : level)) {}
 
-  std::vector<ResultRow> run(LevelPicture* picture) {
+  std::vector<ResultRow> run(LevelOutputs& outputs) {
+    LevelPicture* const picture = outputs.picture;
     bind(picture);
     FrameSequence frames(config_, mesh_, cloud_.positions, level_);
     std::vector<ResultRow> rows;
     Points values, truth;
     const std::vector<int>& numbers = frames.numbers();
+    std::optional<SceneRecorder> recorder;
+    std::optional<SequenceWriter> writer;
+    if (!outputs.sequence_folder.empty()) {
+      std::vector<ResultRow> facts;
+      for (const BoundRule& rule : rules_) facts.push_back(rule.facts);
+      writer.emplace(outputs.sequence_folder, cloud_, facts);
+    }
+    if (outputs.scene != nullptr) recorder.emplace(mesh_, cloud_, numbers.size(), rules_.size());
+    std::vector<Points> results(rules_.size());
     for (std::size_t f = 0; f < numbers.size(); ++f) {
       progress_(fmt::format("level {}: frame {}", level_, numbers[f]), 0.5 + 0.5 * double(f) / double(numbers.size()));
       frames.read(numbers[f], values, truth);
       const std::size_t first = rows.size();
-      for (const BoundRule& rule : rules_) {
-        Points result;
-        rows.push_back(measure(rule, numbers[f], values, truth, result));
+      for (std::size_t r = 0; r < rules_.size(); ++r) {
+        rows.push_back(measure(rules_[r], numbers[f], values, truth, results[r]));
         if (picture != nullptr && f + 1 == numbers.size())
-          picture->errors.emplace_back(rows.back(), (result - truth).rowwise().norm());
+          picture->errors.emplace_back(rows.back(), (results[r] - truth).rowwise().norm());
       }
+      if (recorder && recorder->wants(f)) recorder->add(numbers[f], values, truth, results);
+      if (writer) writer->add(truth, results);
       add_gains(rows, first);
     }
+    if (recorder) *outputs.scene = recorder->text();
+    if (writer) outputs.files = writer->finish();
     if (picture != nullptr) {
       picture->mesh = mesh_;
       picture->cloud = cloud_;
@@ -193,7 +219,7 @@ class LevelRun {
     const std::vector<Index> active = active_vertices(mesh_, embedding);
 
     for (const ConfiguredInterpolant& named : config_.interpolants)
-      if (!named.rule.needs_gradients()) add_rule(embedding, named, facts, nullptr, nullptr);
+      if (!named.needs_gradients()) add_rule(embedding, named, facts, nullptr, nullptr);
     for (std::size_t r = 0; r < config_.reconstructors.size(); ++r) {
       const MadeReconstructor& made = config_.reconstructors[r];
       progress_(fmt::format("level {}: {}", level_, made.name),
@@ -207,13 +233,14 @@ class LevelRun {
           const CellGradients cells(mesh_);
           reconstruction = made.reconstructor->reconstruct(cells, active);
         });
-        own.sigma = weight_spread(*made.reconstructor, CellGradients(mesh_), active);
+        own.sigma = weight_deviation(*made.reconstructor, CellGradients(mesh_), active);
         if (picture != nullptr) picture->stencils.emplace_back(made.name, reconstruction.stencils);
       }
       for (const ConfiguredInterpolant& named : config_.interpolants) {
-        if (!named.rule.needs_gradients()) continue;
+        if (!named.needs_gradients()) continue;
         // Pairs that cannot be are left out, so that one list of each serves a whole table.
-        if (named.rule.needs_hessians() && made.reconstructor && !reconstruction.stencils.has_hessians()) continue;
+        if (named.needs_hessians() && made.reconstructor && !reconstruction.stencils.has_hessians()) continue;
+        if (named.scattered && (!made.reconstructor || reconstruction.blend)) continue;
         add_rule(embedding, named, own, &made, &reconstruction);
       }
     }
@@ -222,15 +249,39 @@ class LevelRun {
 
   void add_rule(const Embedding& embedding, const ConfiguredInterpolant& named, ResultRow facts,
                 const MadeReconstructor* made, const Reconstruction* reconstruction) {
+    if (named.scattered) {
+      add_scattered(named, std::move(facts), made);
+      return;
+    }
     const bool is_exact = made != nullptr && !made->reconstructor;
-    BoundRule rule{{mesh_, embedding, named.rule, is_exact ? nullptr : reconstruction}, is_exact, std::move(facts)};
+    BoundRule rule;
+    rule.interpolant.emplace(mesh_, embedding, named.rule, is_exact ? nullptr : reconstruction);
+    rule.is_exact = is_exact;
+    rule.facts = std::move(facts);
     rule.facts.interpolant = named.name;
     if (named.rule.formula == Formula::blend) rule.facts.alpha = named.rule.alpha;
-    const BindReport& report = rule.interpolant.report();
+    const BindReport& report = rule.interpolant->report();
     rule.facts.skipped_cells = report.num_cells - report.num_active_cells;
     rule.facts.skipped_vertices = report.num_vertices - report.num_active_vertices;
     if (!is_exact && (reconstruction == nullptr || !reconstruction->blend))
-      rule.facts.max_abs_sum = greatest_absolute_sum(rule.interpolant.matrix());
+      rule.facts.max_abs_sum = greatest_absolute_sum(rule.interpolant->matrix());
+    rules_.push_back(std::move(rule));
+  }
+
+  // No cells are searched, and gradients are part of the weights: all of bind is "reconstruct".
+  void add_scattered(const ConfiguredInterpolant& named, ResultRow facts, const MadeReconstructor* made) {
+    BoundRule rule;
+    rule.facts = std::move(facts);
+    rule.facts.interpolant = named.name;
+    nlohmann::json own = nlohmann::json::parse(named.options);
+    if (made != nullptr) own.update(nlohmann::json::parse(made->options));
+    rule.facts.options = own.dump();
+    rule.facts.locate_seconds = 0;
+    rule.facts.reconstruct_seconds = median_seconds(config_.repetitions, [&] {
+      rule.scattered.emplace(mesh_, cloud_.positions, *named.scattered,
+                             made == nullptr ? nullptr : made->reconstructor.get());
+    });
+    rule.facts.max_abs_sum = greatest_absolute_sum(rule.scattered->matrix());
     rules_.push_back(std::move(rule));
   }
 
@@ -251,10 +302,15 @@ class LevelRun {
   ResultRow measure(const BoundRule& rule, int frame, const Points& values, const Points& truth, Points& result) const {
     ResultRow row = rule.facts;
     row.frame = frame;
-    const Interpolant<double>& interpolant = rule.interpolant;
+    if (rule.scattered) {
+      row.evaluate_seconds = median_seconds(config_.repetitions, [&] { result = rule.scattered->evaluate(values); });
+      row.error = region_errors(result, truth, places_);
+      return row;
+    }
+    const Interpolant<double>& interpolant = *rule.interpolant;
     Points gradients, hessians;
     if (rule.is_exact) {
-      exact_derivatives(*config_.field, mesh_, interpolant.active(), gradients, hessians);
+      exact_derivatives(*config_.fields[frame], mesh_, interpolant.active(), gradients, hessians);
     } else if (interpolant.rule().needs_gradients()) {
       row.gradients_seconds = median_seconds(config_.repetitions, [&] {
         gradients = interpolant.vertex_gradients(values);
@@ -275,7 +331,10 @@ class LevelRun {
                                      [](const ResultRow& row) { return row.interpolant == "linear"; });
     if (linear == rows.end()) return;
     const std::array<RegionError, 3> reference = linear->error;
-    for (std::size_t r = first; r < rows.size(); ++r)
+    const double linear_seconds = linear->evaluate_seconds;
+    for (std::size_t r = first; r < rows.size(); ++r) {
+      if (linear_seconds > 0)
+        rows[r].time_over_linear = (rows[r].gradients_seconds + rows[r].evaluate_seconds) / linear_seconds;
       for (int region = 0; region < 3; ++region) {
         const RegionError& error = rows[r].error[region];
         if (reference[region].rms > 0 && error.rms > 0)
@@ -283,6 +342,7 @@ class LevelRun {
         if (reference[region].max > 0 && error.max > 0)
           rows[r].max_gain_over_linear[region] = reference[region].max / error.max;
       }
+    }
   }
 
   const ExperimentConfig& config_;
@@ -296,6 +356,19 @@ class LevelRun {
 
 bool wants(const ExperimentConfig& config, OutputKind kind) {
   return std::find(config.outputs.begin(), config.outputs.end(), kind) != config.outputs.end();
+}
+
+/// report.html, and scene.json so that `halfgrad report` can show the run beside others.
+void write_html(const std::filesystem::path& directory, ExperimentResult& result) {
+  std::string page;
+  if (report_script().empty()) {
+    page = results_html(result.name, {&result, 1});
+  } else {
+    const ReportedRun run{results_json(result), result.scene};
+    page = interactive_html(result.name, {&run, 1});
+    write_report(directory / "scene.json", result.scene, result.files);
+  }
+  write_report(directory / "report.html", page, result.files);
 }
 
 }  // namespace
@@ -313,9 +386,16 @@ ExperimentResult run_experiment(const std::filesystem::path& path, const RunOpti
     const auto progress = [&](std::string_view stage, double fraction) {
       if (options.progress) options.progress(stage, (level + fraction) / num_levels);
     };
-    const bool pictured = level == num_levels - 1 && wants(config, OutputKind::vtu);
+    LevelOutputs outputs;
+    if (level == num_levels - 1) {
+      if (wants(config, OutputKind::vtu)) outputs.picture = &picture;
+      if (wants(config, OutputKind::html) && !report_script().empty()) outputs.scene = &result.scene;
+      if (wants(config, OutputKind::sequence) && !options.out_directory.empty())
+        outputs.sequence_folder = options.out_directory / "sequence";
+    }
     LevelRun run(config, level, progress);
-    const std::vector<ResultRow> rows = run.run(pictured ? &picture : nullptr);
+    const std::vector<ResultRow> rows = run.run(outputs);
+    result.files.insert(result.files.end(), outputs.files.begin(), outputs.files.end());
     result.rows.insert(result.rows.end(), rows.begin(), rows.end());
   }
   result.machine = machine_facts();
@@ -326,8 +406,7 @@ ExperimentResult run_experiment(const std::filesystem::path& path, const RunOpti
     if (wants(config, OutputKind::vtu)) write_pictures(options.out_directory, picture, result.files);
     if (wants(config, OutputKind::csv))
       write_report(options.out_directory / "results.csv", results_csv(result), result.files);
-    if (wants(config, OutputKind::html))
-      write_report(options.out_directory / "report.html", results_html(result), result.files);
+    if (wants(config, OutputKind::html)) write_html(options.out_directory, result);
     if (wants(config, OutputKind::json))
       write_report(options.out_directory / "results.json", results_json(result), result.files);
   }

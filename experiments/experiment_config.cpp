@@ -44,32 +44,6 @@ std::vector<json> read_list(JsonReader& reader, std::string_view key, json fallb
   return {list.begin(), list.end()};
 }
 
-ConfiguredInterpolant read_interpolant(const json& specification, const std::string& pointer, json& resolved) {
-  std::string name;
-  json options = json::object();
-  if (specification.is_string()) {
-    name = specification.get<std::string>();
-  } else if (specification.is_object() && specification.size() == 1) {
-    name = specification.begin().key();
-    options = specification.begin().value();
-  } else {
-    raise("{}: found {}, expected an interpolant's name or {{\"name\": {{options}}}}", pointer, specification.dump());
-  }
-  std::vector<std::string_view> names;
-  for (const NamedRule& known : named_rules()) names.push_back(known.name);
-  if (std::find(names.begin(), names.end(), name) == names.end()) {
-    const std::string nearest = nearest_name(name, names);
-    raise("{}: no interpolant \"{}\"; known: {}{}", pointer, name, join_names(names),
-          nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
-  }
-  ConfiguredInterpolant interpolant{name, named_rule(name)};
-  JsonReader reader(options, pointer + "/" + name);
-  if (name == "vertex_blend") interpolant.rule.alpha = reader.number("alpha", interpolant.rule.alpha);
-  reader.finish();
-  resolved = reader.resolved().empty() ? json(name) : json{{name, reader.resolved()}};
-  return interpolant;
-}
-
 /// The registry's reconstructors, and `exact`, which takes the field itself.
 MadeReconstructor read_reconstructor(const json& specification, const std::string& pointer, bool has_field) {
   const bool is_exact = specification == "exact" ||
@@ -100,8 +74,31 @@ FrameFiles read_frame_files(const json& specification, const std::string& pointe
   return files;
 }
 
+/// The field frame by frame, one of its numbers growing in equal steps from zero (left out) to its value.
+std::vector<std::unique_ptr<Field>> read_sequence(const json& specification, const json& field,
+                                                  const FieldSetting& setting, json& resolved) {
+  JsonReader reader(specification, "/sequence");
+  const std::int64_t frames = reader.integer("frames", 8);
+  if (frames < 1 || frames > 10000) raise("/sequence/frames: found {}, expected 1 to 10000", frames);
+  const std::string parameter = reader.text("parameter");
+  reader.finish();
+  resolved = reader.resolved();
+  const std::string name = field.begin().key();
+  const json& options = field.begin().value();
+  const auto entry = options.find(parameter);
+  if (entry == options.end() || !entry->is_number())
+    raise("/sequence/parameter: \"{}\" is no number of the field {}: {}", parameter, name, options.dump());
+  std::vector<std::unique_ptr<Field>> fields;
+  for (std::int64_t frame = 1; frame <= frames; ++frame) {
+    json scaled = field;
+    scaled[name][parameter] = entry->get<double>() * static_cast<double>(frame) / static_cast<double>(frames);
+    fields.push_back(make_field(scaled, "/field", setting));
+  }
+  return fields;
+}
+
 std::vector<OutputKind> read_outputs(JsonReader& reader) {
-  constexpr std::array<std::string_view, 4> known = {"json", "csv", "html", "vtu"};
+  constexpr std::array<std::string_view, 5> known = {"json", "csv", "html", "vtu", "sequence"};
   std::vector<OutputKind> outputs;
   const std::vector<json> list = read_list(reader, "outputs", json::array({"json", "csv"}));
   for (std::size_t i = 0; i < list.size(); ++i) {
@@ -138,7 +135,13 @@ ExperimentConfig read_config(const json& document, const std::filesystem::path& 
   } else {
     // Only the file knows the dimension of a mesh that is read.
     if (config.mesh.gdim == 0) config.mesh.gdim = config.mesh.make(0).gdim();
-    config.field = make_field(field, "/field", {config.mesh.gdim, config.seed}, &resolved);
+    const FieldSetting setting{config.mesh.gdim, config.seed};
+    config.fields.push_back(make_field(field, "/field", setting, &resolved));
+    if (const json* sequence = reader.find("sequence")) {
+      json filled;
+      config.fields = read_sequence(*sequence, resolved, setting, filled);
+      reader.record("sequence", filled);
+    }
   }
   reader.record("field", resolved);
 
@@ -151,7 +154,7 @@ ExperimentConfig read_config(const json& document, const std::filesystem::path& 
   filled.clear();
   for (const json& entry : read_list(reader, "reconstructors", json::array({"chandrashekar_garg"}))) {
     config.reconstructors.push_back(
-        read_reconstructor(entry, fmt::format("/reconstructors/{}", filled.size()), config.field != nullptr));
+        read_reconstructor(entry, fmt::format("/reconstructors/{}", filled.size()), !config.fields.empty()));
     const MadeReconstructor& made = config.reconstructors.back();
     filled.push_back(json{{made.name, json::parse(made.options)}});
   }

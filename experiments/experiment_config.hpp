@@ -9,6 +9,7 @@
 
 #include "experiments/expectations.hpp"
 #include "experiments/fields.hpp"
+#include "experiments/interpolant_spec.hpp"
 #include "experiments/mesh_source.hpp"
 #include "experiments/point_source.hpp"
 #include "framework/embedding.hpp"
@@ -17,12 +18,6 @@
 
 namespace halfgrad {
 
-/// A rule and the name it was configured by.
-struct ConfiguredInterpolant {
-  std::string name;
-  InterpolationRule rule;
-};
-
 /// Deformed vertices and true points from files.
 struct FrameFiles {
   std::vector<std::filesystem::path> frames;  ///< one a level
@@ -30,15 +25,15 @@ struct FrameFiles {
   std::vector<int> select;  ///< frame numbers, negative ones from the end; empty is all
 };
 
-enum class OutputKind : std::uint8_t { json, csv, html, vtu };
+enum class OutputKind : std::uint8_t { json, csv, html, vtu, sequence };
 
 struct ExperimentConfig {
   std::string name;
   std::uint64_t seed = 0;
   MeshSource mesh;
   PointSource points;
-  std::unique_ptr<Field> field;     ///< null where files give the frames
-  std::optional<FrameFiles> files;  ///< none where a field does
+  std::vector<std::unique_ptr<Field>> fields;  ///< one a frame; none where files give the frames
+  std::optional<FrameFiles> files;             ///< none where a field does
   std::vector<ConfiguredInterpolant> interpolants;
   std::vector<MadeReconstructor> reconstructors;  ///< `exact` has a null reconstructor
   Outside outside = Outside::error;

@@ -27,7 +27,10 @@ json row_json(const ResultRow& row) {
   json error, gain;
   for (int r = 0; r < 3; ++r) {
     const std::string region(region_names[r]);
-    error[region] = {{"max", row.error[r].max}, {"rms", row.error[r].rms}, {"points", row.error[r].points}};
+    error[region] = {{"max", row.error[r].max},
+                     {"rms", row.error[r].rms},
+                     {"mean", row.error[r].mean},
+                     {"points", row.error[r].points}};
     gain[region] = or_null(row.gain_over_linear[r]);
   }
   return {{"level", row.level},
