@@ -8,9 +8,12 @@
 #include <memory>
 
 #include "apps/deform.hpp"
+#include "apps/describe.hpp"
+#include "apps/export.hpp"
 #include "apps/listings.hpp"
 #include "experiments/experiment.hpp"
 #include "framework/error.hpp"
+#include "framework/json_reader.hpp"
 #include "framework/version.hpp"
 
 namespace {
@@ -25,12 +28,13 @@ constexpr const char* first_words =
     "\n"
     "  halfgrad deform --rest mesh.msh --frames frames.npy --points surface.obj --out out.npy\n"
     "      carry points through a sequence\n"
+    "  halfgrad export --rest mesh.msh --points surface.obj --out map.npz\n"
+    "      write the map itself, for SciPy, a game engine or a shader to apply\n"
     "  halfgrad run configs/quickstart.json --out out/quickstart\n"
     "      run an experiment: errors, orders and run times of interpolants and reconstructors\n"
-    "  halfgrad info mesh.msh\n"
-    "      what is in a mesh\n"
     "\n"
-    "halfgrad --help lists all commands; halfgrad COMMAND --help explains one.\n";
+    "halfgrad info mesh.msh shows what is in a mesh; halfgrad --help lists all commands, halfgrad COMMAND --help\n"
+    "explains one with an example.\n";
 
 struct RunCommand {
   std::filesystem::path config, out = "results";
@@ -65,6 +69,63 @@ int run(const RunCommand& command, ProgressMode mode, bool quiet) {
   return expectation_failed;
 }
 
+CommandFacts facts_of(const CLI::App& app) {
+  CommandFacts facts{app.get_name(), app.get_description(), app.get_footer(), {}};
+  if (facts.example.starts_with("Example: ")) facts.example.erase(0, 9);
+  for (const CLI::Option* option : app.get_options()) {
+    OptionFacts entry;
+    entry.name = option->get_positional() ? option->get_name(true) : "--" + option->get_lnames().front();
+    // Every command has --help; the program's own stands for all.
+    if (entry.name == "--help" && app.get_parent() != nullptr) continue;
+    entry.description = option->get_description();
+    entry.fallback = option->get_default_str();
+    entry.required = option->get_required();
+    entry.words = known_words(facts.name, entry.name);
+    const std::string type = option->get_type_name();
+    if (option->get_items_expected() > 0)
+      entry.value = type.starts_with("INT") || type.starts_with("FLOAT") ? "NUMBER" : type;
+    facts.options.push_back(std::move(entry));
+  }
+  return facts;
+}
+
+ProgramFacts facts_of_program(const CLI::App& program) {
+  ProgramFacts facts{facts_of(program), {}};
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
+    facts.commands.push_back(facts_of(*command));
+  return facts;
+}
+
+// What --help shows as an option's argument; CLI11 calls both file names and words TEXT.
+void name_arguments(CLI::App& app) {
+  for (CLI::Option* option : app.get_options())
+    if (option->get_items_expected() > 0 && option->get_type_name() == "TEXT")
+      option->type_name(known_words(app.get_name(), option->get_name(option->get_positional())).empty() ? "FILE"
+                                                                                                        : "WORD");
+}
+
+// Says what was wrong with the command line and what to type next.
+[[noreturn]] void refuse_usage(const CLI::App& program, const CLI::ParseError& error) {
+  const std::vector<CLI::App*> parsed = program.get_subcommands();
+  const CommandFacts shared = facts_of(program);
+  std::vector<std::string> names;
+  if (parsed.empty()) {
+    for (const CommandFacts& command : facts_of_program(program).commands) names.push_back(command.name);
+  } else {
+    for (const CommandFacts& facts : {facts_of(*parsed.front()), shared})
+      for (const OptionFacts& option : facts.options)
+        if (!option.positional()) names.push_back(option.name);
+  }
+  const std::string command = parsed.empty() ? "halfgrad" : "halfgrad " + parsed.front()->get_name();
+  const std::vector<std::string> unknown = program.remaining(true);
+  if (unknown.empty()) raise("{}; see {} --help", error.what(), command);
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  const std::string nearest = nearest_name(unknown.front(), known);
+  raise("{} is no {} of {}{}; see {} --help", unknown.front(), parsed.empty() ? "command" : "option", command,
+        nearest.empty() ? fmt::format(", known: {}", join_names(known)) : fmt::format("; did you mean {}?", nearest),
+        command);
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App program("Carries detailed points through the deformation of a coarse mesh.", "halfgrad");
   program.set_version_flag("--version", std::string("halfgrad ") + version);
@@ -80,13 +141,17 @@ int dispatch(int argc, char** argv) {
   CLI::App* run_app = program.add_subcommand("run", "Run an experiment and write results.json");
   run_app->add_option("config", command.config, "Configuration, JSON")->required();
   run_app->add_option("--out", command.out, "Folder for the results")->capture_default_str();
-  run_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")->take_all();
+  run_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")
+      ->take_all()
+      ->type_name("KEY=VALUE");
   run_app->add_flag("--reduced", command.reduced, "Apply the configuration's \"reduced\" object: the quick version");
   run_app->footer("Example: halfgrad run configs/quickstart.json --out out/quickstart --set /seed=3");
 
   CLI::App* check_app = program.add_subcommand("check", "Validate a configuration only");
   check_app->add_option("config", command.config, "Configuration, JSON")->required();
-  check_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")->take_all();
+  check_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")
+      ->take_all()
+      ->type_name("KEY=VALUE");
   check_app->footer("Example: halfgrad check configs/quickstart.json");
 
   DeformOptions options;
@@ -122,6 +187,30 @@ int dispatch(int argc, char** argv) {
       "Example: halfgrad deform --rest cage.msh --frames sim.npy --points render.obj --out render.pc2 --precision "
       "float");
 
+  ExportOptions map;
+  CLI::App* export_app = program.add_subcommand("export", "Write the map from vertices to points for other programs");
+  export_app->add_option("--rest", map.rest, "Rest mesh: .msh .vtk .vtu .mesh .node/.ele")->required();
+  export_app->add_option("--points", map.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy")->required();
+  export_app
+      ->add_option("--out", map.out, "Output: .npz (SciPy, or stencils) .mtx (Matrix Market) .json (affine bones)")
+      ->required();
+  export_app->add_option("--as", map.as, "matrix, stencils or bones (default: .json holds bones, others a matrix)");
+  CLI::Option* map_interpolant =
+      export_app->add_option("--interpolant", map.interpolant, "See halfgrad list interpolants")->capture_default_str();
+  export_app->add_option("--alpha", map.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
+  export_app->add_option("--reconstructor", map.reconstructor,
+                         "A name or JSON; see halfgrad list reconstructors (default: kriging; for dual_taylor with "
+                         "cubic drift)");
+  export_app->add_option("--outside", map.outside, "Points outside the mesh: error, nearest or mark")
+      ->capture_default_str();
+  export_app->add_option("--precision", map.precision, "float or double")->capture_default_str();
+  export_app->add_flag("--transpose", map.transpose, "Write the matrix's transpose, which carries forces");
+  export_app->add_option("--frames", map.frames, "Deformed vertices, for the transforms of bones");
+  export_app->add_option("--first", map.first, "First frame, from 0")->capture_default_str();
+  export_app->add_option("--last", map.last, "Last frame (default: the last one)")->check(CLI::NonNegativeNumber);
+  export_app->add_option("--step", map.step, "Take every step-th frame")->capture_default_str();
+  export_app->footer("Example: halfgrad export --rest cage.msh --points render.obj --out map.npz");
+
   std::string what;
   bool as_json = false;
   CLI::App* list_app = program.add_subcommand("list", "List elements, reconstructors, interpolants, fields");
@@ -135,10 +224,19 @@ int dispatch(int argc, char** argv) {
   info_app->add_flag("--json", as_json, "Print JSON");
   info_app->footer("Example: halfgrad info cage.msh");
 
+  std::string format;
+  CLI::App* describe_app =
+      program.add_subcommand("describe", "Print shell completion, the manual page or the command reference");
+  describe_app->add_option("format", format, "bash, zsh, fish, man or markdown")->required();
+  describe_app->footer("Example: source <(halfgrad describe bash)");
+
+  name_arguments(program);
+  for (CLI::App* command_app : program.get_subcommands([](CLI::App*) { return true; })) name_arguments(*command_app);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return program.exit(error) == 0 ? all_well : bad_input;
+    if (error.get_exit_code() != 0) refuse_usage(program, error);
+    return program.exit(error);
   }
   std::unique_ptr<tbb::global_control> limit;
   if (threads > 0)
@@ -157,12 +255,23 @@ int dispatch(int argc, char** argv) {
     deform(options);
     return all_well;
   }
+  if (export_app->parsed()) {
+    if (map.alpha && map_interpolant->count() == 0) map.interpolant = "vertex_blend";
+    map.progress = mode;
+    map.quiet = quiet;
+    export_map(map);
+    return all_well;
+  }
   if (list_app->parsed()) {
     list(what, as_json);
     return all_well;
   }
   if (info_app->parsed()) {
     info(mesh, as_json);
+    return all_well;
+  }
+  if (describe_app->parsed()) {
+    fmt::print("{}", describe(facts_of_program(program), format));
     return all_well;
   }
   fmt::print("{}", first_words);
