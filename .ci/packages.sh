@@ -2,8 +2,8 @@
 # Sourced by quickstart, run-tests and .ci/run.
 
 build_packages=(g++ cmake ninja-build libeigen3-dev libfmt-dev nlohmann-json3-dev libtbb-dev libhwy-dev
-  libfast-float-dev libpugixml-dev zlib1g-dev libcli11-dev libnanoflann-dev)
-test_packages=(libgtest-dev libgmock-dev)
+  libfast-float-dev libpugixml-dev zlib1g-dev libcli11-dev libnanoflann-dev libzip-dev pkg-config)
+test_packages=(libgtest-dev libgmock-dev python3-scipy)
 check_packages=(clang-format)
 
 # install_packages NAME...: leaves apt alone where nothing is missing.

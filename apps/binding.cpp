@@ -18,10 +18,8 @@ using nlohmann::json;
 
 namespace {
 
-// Where the user names none: the rule that was measured to be safe on every kind of data (docs/adaptive.md), and the
-// one that gives Hessians where they are needed.
-json parse_reconstructor(const std::string& text, const InterpolationRule& rule) {
-  if (text.empty()) return rule.needs_hessians() ? json{{"kriging", {{"drift", "cubic"}}}} : json("adaptive");
+json parse_reconstructor(const std::string& text, const InterpolationRule& rule, std::string_view preferred) {
+  if (text.empty()) return rule.needs_hessians() ? json{{"kriging", {{"drift", "cubic"}}}} : json(preferred);
   if ((text[0] != '{' && text[0] != '"')) return text;
   try {
     return json::parse(text);
@@ -62,7 +60,7 @@ void require_same(const std::string& given, const std::string& bound, const char
 
 }  // namespace
 
-BindSettings parse_settings(const BindOptions& options) {
+BindSettings parse_settings(const BindOptions& options, std::string_view preferred) {
   BindSettings settings;
   settings.binding = options.binding;
   settings.rest = options.rest;
@@ -86,7 +84,7 @@ BindSettings parse_settings(const BindOptions& options) {
     if (options.interpolant) require_same(*options.interpolant, settings.interpolant, "--interpolant", options.binding);
     if (options.outside) require_same(*options.outside, settings.outside, "--outside", options.binding);
     if (!specification.empty()) {
-      const json wanted = parse_reconstructor(specification, named_rule(settings.interpolant));
+      const json wanted = parse_reconstructor(specification, named_rule(settings.interpolant), preferred);
       require_same(wanted.dump(), read("reconstructor"), "--reconstructor", options.binding);
     }
     specification = read("reconstructor");
@@ -99,7 +97,7 @@ BindSettings parse_settings(const BindOptions& options) {
   }
   settings.rule = parse_rule(settings.interpolant, alpha);
   parse_outside(settings.outside);
-  const json parsed = parse_reconstructor(specification, settings.rule);
+  const json parsed = parse_reconstructor(specification, settings.rule, preferred);
   const MadeReconstructor made = make_reconstructor(parsed, "--reconstructor");
   settings.specification = parsed.dump();
   settings.reconstructor = made.name;

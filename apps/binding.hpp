@@ -18,7 +18,7 @@ struct BindOptions {
   std::filesystem::path binding;  ///< a saved binding; it fills in what the others leave open
   std::optional<std::string> interpolant;
   std::optional<double> alpha;
-  std::string reconstructor;  ///< a name or JSON; empty: adaptive, or for dual_taylor kriging with cubic drift
+  std::string reconstructor;  ///< a name or JSON; empty: what the command prefers
   std::optional<std::string> outside;
 };
 
@@ -33,8 +33,9 @@ struct BindSettings {
   std::string to_json() const;
 };
 
-/// Throws Error on unknown names and values, and on options that contradict the saved binding.
-BindSettings parse_settings(const BindOptions& options);
+/// Where the user names no reconstructor: `preferred`, or for rules that need Hessians kriging with cubic drift. Throws
+/// Error on unknown names and values, and on options that contradict the saved binding.
+BindSettings parse_settings(const BindOptions& options, std::string_view preferred = "adaptive");
 
 /// What binding took and gave.
 struct Binding {

@@ -150,8 +150,8 @@ Embedding embed(const Mesh& mesh, const Points& points, const EmbedOptions& opti
     const OutsidePoint& first = result.outside.front();
     raise(
         "{} of {} points lie outside the mesh; the first is point {} at {}, at distance {:.6g}; the farthest is point "
-        "{}, at distance {:.6g}: expected points inside, or the policy nearest (the closest cell serves them) or mark "
-        "(their results are NaN)",
+        "{}, at distance {:.6g}: expected points inside, or the policy nearest (--outside nearest: the closest cell "
+        "serves them) or mark (--outside mark: their results are NaN)",
         result.outside.size(), result.num_points(), first.point, describe(points, first.point), first.distance,
         farthest->point, farthest->distance);
   }

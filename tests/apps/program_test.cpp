@@ -101,9 +101,10 @@ class Program : public testing::Test {
 TEST_F(Program, TellsANewUserWhatItDoes) {
   const Outcome bare = run_program("");
   EXPECT_EQ(bare.status, 0);
-  EXPECT_THAT(bare.output, AllOf(HasSubstr("halfgrad deform"), HasSubstr("halfgrad run"), HasSubstr("halfgrad info")));
+  EXPECT_THAT(bare.output,
+              AllOf(HasSubstr("halfgrad deform"), HasSubstr("halfgrad export"), HasSubstr("halfgrad run")));
   EXPECT_EQ(run_program("--help").status, 0);
-  for (const char* command : {"run", "deform", "check", "list", "info"}) {
+  for (const char* command : {"run", "deform", "check", "export", "list", "info", "describe"}) {
     const Outcome help = run_program(std::string(command) + " --help");
     EXPECT_EQ(help.status, 0);
     EXPECT_THAT(help.output, HasSubstr("Example: halfgrad ")) << command;
@@ -117,6 +118,24 @@ TEST_F(Program, UsageErrorsExitWith2) {
   EXPECT_EQ(run_program("info").status, 2);
   EXPECT_EQ(run_program("list shoes").status, 2);
   EXPECT_EQ(run_program("--threads 0 list").status, 2);
+}
+
+TEST_F(Program, UsageErrorsSayWhatToTypeNext) {
+  EXPECT_THAT(run_program("dfeorm").output, AllOf(HasSubstr("did you mean deform?"), HasSubstr("halfgrad --help")));
+  EXPECT_THAT(run_program("dance").output, AllOf(HasSubstr("dance"), HasSubstr("deform, export")));
+  EXPECT_THAT(deform("--intepolant linear").output,
+              AllOf(HasSubstr("did you mean --interpolant?"), HasSubstr("halfgrad deform --help")));
+  EXPECT_THAT(run_program("deform --rest").output, AllOf(HasSubstr("--rest"), HasSubstr("halfgrad deform --help")));
+}
+
+TEST_F(Program, DescribesEveryCommandForShellsAndManuals) {
+  for (const char* format : {"bash", "zsh", "fish", "man", "markdown"}) {
+    const Outcome described = run_program(std::string("describe ") + format);
+    EXPECT_EQ(described.status, 0);
+    for (const char* word : {"deform", "export", "interpolant", "threads"})
+      EXPECT_THAT(described.output, HasSubstr(word)) << format;
+  }
+  EXPECT_THAT(run_program("describe docx").output, HasSubstr("markdown"));
 }
 
 TEST_F(Program, ListsWhatTheRegistriesHold) {
