@@ -39,7 +39,7 @@ std::int64_t carry_frames(const DeformOptions& options, const ScatteredTransfer&
 
 /// A name, or JSON with options.
 json parse_interpolant(const std::string& text) {
-  if (text[0] != '{') return text;
+  if (text.empty() || text[0] != '{') return text;
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
@@ -50,10 +50,11 @@ json parse_interpolant(const std::string& text) {
 }  // namespace
 
 bool is_scattered(const std::string& interpolant) {
-  if (find_scattered_rule(interpolant)) return true;
-  if (interpolant.empty() || interpolant[0] != '{') return false;
   json ignored;
-  return read_interpolant(parse_interpolant(interpolant), "--interpolant", ignored).scattered.has_value();
+  const ConfiguredInterpolant named = read_interpolant(parse_interpolant(interpolant), "--interpolant", ignored);
+  if (!named.scattered && interpolant != named.name)
+    raise("--interpolant {}: {} takes no options in JSON (vertex_blend takes --alpha)", interpolant, named.name);
+  return named.scattered.has_value();
 }
 
 void deform_scattered(const DeformOptions& options) {

@@ -175,7 +175,7 @@ class LevelRun {
     if (!outputs.sequence_folder.empty()) {
       std::vector<ResultRow> facts;
       for (const BoundRule& rule : rules_) facts.push_back(rule.facts);
-      writer.emplace(outputs.sequence_folder, cloud_, facts);
+      writer.emplace(outputs.sequence_folder, mesh_, cloud_, facts);
     }
     if (outputs.scene != nullptr) recorder.emplace(mesh_, cloud_, numbers.size(), rules_.size());
     std::vector<Points> results(rules_.size());
@@ -189,7 +189,7 @@ class LevelRun {
           picture->errors.emplace_back(rows.back(), (results[r] - truth).rowwise().norm());
       }
       if (recorder && recorder->wants(f)) recorder->add(numbers[f], values, truth, results);
-      if (writer) writer->add(truth, results);
+      if (writer) writer->add(values, truth, results);
       add_gains(rows, first);
     }
     if (recorder) *outputs.scene = recorder->text();

@@ -1,5 +1,7 @@
 #include "experiments/sequence_writer.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 
@@ -21,31 +23,44 @@ std::string file_name(const std::string& rule) {
 
 }  // namespace
 
-SequenceWriter::SequenceWriter(const std::filesystem::path& folder, const PointCloud& cloud,
+SequenceWriter::SequenceWriter(const std::filesystem::path& folder, const Mesh& mesh, const PointCloud& cloud,
                                std::span<const ResultRow> rules) {
   std::filesystem::create_directories(folder);
+  rest_vertices_ = add_sink(folder / "rest_vertices.npy");
+  rest_vertices_->write(mesh.vertices());
+  vertices_ = add_sink(folder / "vertices.npy");
+  rest_points_ = add_sink(folder / "rest_points.npy");
+  rest_points_->write(cloud.positions);
+  truth_array_ = add_sink(folder / "truth.npy");
   PointSet shape;
   shape.points = cloud.positions;
   shape.faces = cloud.faces;
-  std::vector<std::string> stems = {"truth"};
+  truth_ = add_sink(folder / "truth.pvd", shape);
+  std::vector<std::string> stems;
   for (const ResultRow& row : rules) {
     const std::string stem = file_name(rule_name(row.interpolant, row.reconstructor, row.options));
     const auto uses = std::count(stems.begin(), stems.end(), stem);
-    stems.push_back(uses == 0 ? stem : stem + "_" + std::to_string(uses + 1));
-  }
-  for (const std::string& stem : stems) {
-    names_.push_back((folder / (stem + ".pvd")).string());
-    sinks_.push_back(create_frames(names_.back(), shape));
+    stems.push_back(stem);
+    rules_.push_back(add_sink(folder / ((uses == 0 ? stem : fmt::format("{}_{}", stem, uses + 1)) + ".pvd"), shape));
   }
 }
 
-void SequenceWriter::add(const Points& truth, std::span<const Points> results) {
-  sinks_[0]->write(truth);
-  for (std::size_t r = 0; r < results.size(); ++r) sinks_[r + 1]->write(results[r]);
+std::unique_ptr<FrameSink> SequenceWriter::add_sink(const std::filesystem::path& path, const PointSet& shape) {
+  names_.push_back(path.string());
+  return create_frames(path, shape);
+}
+
+void SequenceWriter::add(const Points& vertices, const Points& truth, std::span<const Points> results) {
+  vertices_->write(vertices);
+  truth_array_->write(truth);
+  truth_->write(truth);
+  for (std::size_t r = 0; r < results.size(); ++r) rules_[r]->write(results[r]);
 }
 
 std::vector<std::string> SequenceWriter::finish() {
-  for (const std::unique_ptr<FrameSink>& sink : sinks_) sink->finish();
+  for (FrameSink* sink : {rest_vertices_.get(), vertices_.get(), rest_points_.get(), truth_array_.get(), truth_.get()})
+    sink->finish();
+  for (const std::unique_ptr<FrameSink>& sink : rules_) sink->finish();
   return names_;
 }
 

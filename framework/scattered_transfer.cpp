@@ -47,8 +47,7 @@ std::vector<Neighbor> neighbors_of(const Tree& tree, const Cloud& cloud, const d
   std::vector<std::size_t> nearest(asked);
   std::vector<double> squares(asked);
   tree.knnSearch(point, asked, nearest.data(), squares.data());
-  const double reach = asked > least ? std::sqrt(squares.back()) : 2 * std::sqrt(squares.back());
-  const double greatest = std::max(radius, reach), square = greatest * greatest;
+  const double square = std::max(radius * radius, asked > least ? squares.back() : 4 * squares.back());
   std::vector<std::pair<std::size_t, double>> found;
   tree.radiusSearch(point, square, found, nanoflann::SearchParams(0, 0, false));
   std::vector<Neighbor> neighbors;

@@ -45,11 +45,11 @@ Points bent(const Points& X, double amount) {
 TEST(ScatteredTransfer, CarriesTranslationsWithAnyRuleAndAnyPoint) {
   const Mesh mesh = jittered();
   Points points(3, 3);
-  points << 0.5, 0.5, 0.5, 0, 0, 0, 4, -3, 7;  // the last lies far outside
+  points << 0.5, 0.5, 0.5, 0, 0, 0, 4, -3, 7;  // the last lies far outside, where weights of a fit are large
   const Points moved = (mesh.vertices().array() + 2.5).matrix();
   for (const NamedScatteredRule& named : scattered_rules()) {
     const ScatteredTransfer transfer(mesh, points, named.rule);
-    EXPECT_LT((transfer.evaluate(moved) - (points.array() + 2.5).matrix()).norm(), 1e-12) << named.name;
+    EXPECT_LT((transfer.evaluate(moved) - (points.array() + 2.5).matrix()).norm(), 1e-10) << named.name;
     EXPECT_LT((transfer.matrix() * Eigen::VectorXd::Ones(mesh.num_vertices()) - Eigen::VectorXd::Ones(3)).norm(),
               1e-12);
   }
@@ -81,15 +81,15 @@ TEST(ScatteredTransfer, ScalesWithTheMesh) {
   }
 }
 
-/// rms errors on the one mesh at sizes 1 and ½, under a field that does not shrink with it.
+/// The order between the one mesh at two small sizes, under a field that does not shrink with it.
 double halving_order(const ScatteredRule& rule, const VertexGradientReconstructor* reconstructor) {
   std::vector<double> errors;
-  for (const double size : {0.25, 0.125}) {
+  for (const double size : {1.0 / 32, 1.0 / 64}) {
     const Mesh mesh = jittered(size);
     const Points points = random_points(mesh, 500, 4);
     const auto field = [](const Points& X) {
       Points x = X;
-      x.col(0) = (X.col(0).array() + 0.3 * (2 * X.col(1).array() + X.col(2).array()).sin()).matrix();
+      x.col(0) = (X.col(0).array() + 0.3 * (1 + 2 * X.col(1).array() + X.col(2).array()).sin()).matrix();
       return x;
     };
     const ScatteredTransfer transfer(mesh, points, rule, reconstructor);

@@ -63,7 +63,7 @@ addEventListener("load", () => {
     found.recolored = distance(copy(0)[1], lastColors);
     choice.value = "0";
     choice.dispatchEvent(new Event("change"));
-    for (const id of ["flat", "wires", "logarithmic"]) {
+    for (const id of ["flat", "fine", "wires", "logarithmic"]) {
       const box = document.getElementById(id);
       for (let twice = 0; twice < 2; ++twice) { box.checked = !box.checked; box.dispatchEvent(new Event("change")); }
     }

@@ -1,6 +1,6 @@
 // Charts of a run; chips above them choose the rules that all of them show.
 import * as Plot from "@observablehq/plot";
-import { decode, decodePositions, element, frameSeconds, greatest, regionTitle, rms, short } from "./data.js";
+import { decode, decodePositions, element, frameSeconds, greatest, palette, regionTitle, rms, short } from "./data.js";
 
 /** The colour and symbol of a rule as a small <svg>. */
 export function marker(rule) {
@@ -127,19 +127,19 @@ function sweepCharts({ reconstructor, interpolant, key, rows }) {
       marks: [
         Plot.line(points, { x: "x", y: "y", z: "name", stroke: "color", strokeWidth: 1.8 }),
         Plot.dot(points, { x: "x", y: "y", fill: "color", r: 3.5 }),
-        Plot.text(points, Plot.selectLast({ x: "x", y: "y", z: "name", text: "name", fill: "color", textAnchor: "start", dx: 8 })),
+        ...kinds.map(({ name, dy = 0 }) => Plot.text(points.filter((point) => point.name === name), Plot.selectLast({ x: "x", y: "y", text: "name", fill: "color", textAnchor: "start", dx: 8, dy }))),
         Plot.tip(points, Plot.pointer({ x: "x", y: "y", title: (point) => `${point.name}\n${key} ${short(point.x)}: ${short(point.y)}` })),
       ],
     }));
   };
   const errors = [
     { name: "max", color: "#d55e00", value: (row) => greatest(row, "all") },
-    { name: "rms", color: "#0072b2", value: (row) => rms(row, "all") },
+    { name: "rms", color: "#0072b2", dy: -7, value: (row) => rms(row, "all") },
   ];
-  if (rows[0].error.all.mean !== undefined) errors.push({ name: "mean", color: "#009e73", value: (row) => row.error.all.mean });
+  if (rows[0].error.all.mean !== undefined) errors.push({ name: "mean", color: "#009e73", dy: 7, value: (row) => row.error.all.mean });
   return [
     chart(`Error against ${key}`, errors, "↑ error"),
-    chart(`Deviation σ of the cell weights against ${key}`, [{ name: "σ", color: "#8a5fbf", value: (row) => row.weights.sigma ?? NaN }], "↑ σ"),
+    chart(`Deviation σ of the weights against ${key}`, [{ name: "σ", color: "#8a5fbf", value: (row) => row.weights.sigma ?? NaN }], "↑ σ"),
   ].filter(Boolean);
 }
 
@@ -148,16 +148,22 @@ function histogram(run, shown) {
   if (!scene || scene.omitted) return null;
   const bins = 60;
   const errors = run.rules.map((rule) => shown.has(rule.index) ? decode(scene.rules[rule.index].errors.at(-1)) : []);
+  // From the least per cent of some rule: points on vertices have no error but round-off's.
   let low = Infinity, high = 0;
-  for (const list of errors) for (const error of list) if (error > 0) { low = Math.min(low, error); high = Math.max(high, error); }
+  for (const list of errors) {
+    const sorted = Float32Array.from(list).filter((error) => error > 0).sort();
+    if (!sorted.length) continue;
+    low = Math.min(low, sorted[Math.floor(sorted.length / 100)]);
+    high = Math.max(high, sorted.at(-1));
+  }
   if (!(high > low)) return null;
-  low = Math.max(low, high * 1e-7);
+  low = Math.max(low, high * 1e-6);
   const start = Math.log10(low), step = (Math.log10(high) - start) / bins;
   const points = [];
   errors.forEach((list, rule) => {
     if (!list.length) return;
     const counts = new Array(bins).fill(0);
-    for (const error of list) if (error > 0) counts[Math.min(bins - 1, Math.max(0, Math.floor((Math.log10(error) - start) / step)))] += 1;
+    for (const error of list) if (error >= low) counts[Math.min(bins - 1, Math.floor((Math.log10(error) - start) / step))] += 1;
     counts.forEach((count, bin) => points.push({ x: 10 ** (start + (bin + 0.5) * step), y: (100 * count) / list.length, rule, text: `${run.rules[rule].name}\n${((100 * count) / list.length).toFixed(1)} % of points near ${short(10 ** (start + (bin + 0.5) * step))}` }));
   });
   const x = axis("error of a point →", [low, high]), y = { ...axis("↑ % of points a bin", [], "linear"), zero: true };
@@ -182,11 +188,13 @@ function profile(run, shown) {
     const value = decodePositions(scene.rules[rule.index].positions.at(-1), 1);
     return order.map((p) => ({ x: rest[3 * p], y: Math.sign(value[3 * p] - truth[3 * p]) * size[p], rule: rule.index, text: `${rule.name}\nX ${short(rest[3 * p])}: ${short(size[p])}` }));
   });
+  // Lines of one reconstructor differ here: a colour for each rule.
+  const color = (point) => (run.rules[point.rule].reconstructor ? palette[point.rule % palette.length] : run.rules[point.rule].color);
   return figure("Signed error along the axis", "finest level", Plot.plot({
     ...common, inset: 6, x: axis("X →", [], "linear"), y: axis("↑ interpolated − true", [], "linear"),
     marks: [
       Plot.ruleY([0], { stroke: "#9aa4ae" }),
-      Plot.line(points, { x: "x", y: "y", z: "rule", stroke: (point) => run.rules[point.rule].color, strokeWidth: 1.6 }),
+      Plot.line(points, { x: "x", y: "y", z: "rule", stroke: color, strokeWidth: 1.6 }),
       Plot.tip(points, Plot.pointer({ x: "x", y: "y", title: "text" })),
     ],
   }));
@@ -203,7 +211,7 @@ export function chartSection(run) {
   const draw = () => {
     const charts = [];
     if (run.levels > 1) charts.push(convergence(run, shown, "interior"), convergence(run, shown, "boundary"));
-    charts.push(pareto(run, shown), profile(run, shown), histogram(run, shown));
+    charts.push(profile(run, shown), pareto(run, shown), histogram(run, shown));
     if (run.frames > 1) charts.push(overFrames(run, shown));
     place.replaceChildren(...swept.flatMap(sweepCharts), ...charts.filter(Boolean));
   };

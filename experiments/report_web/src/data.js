@@ -26,7 +26,7 @@ export function decodePositions(array, columns) {
 export const regions = ["all", "interior", "boundary"];
 export const regionTitle = { all: "all points", interior: "inside", boundary: "at the boundary" };
 
-const palette = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a5fbf", "#a0522d", "#5b7f00", "#c2185b"];
+export const palette = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a5fbf", "#a0522d", "#5b7f00", "#c2185b"];
 const symbols = { linear: "circle", phong: "square", hermite: "triangle", dual_taylor: "diamond2", vertex_blend: "cross", quadratic10: "wye", attribute_transfer: "times", moving_least_squares: "star" };
 
 const text = (value) => (typeof value === "string" ? value : JSON.stringify(value));
@@ -62,7 +62,7 @@ export class Run {
       same.some((other) => text(other.options[key]) !== text(value)),
     );
     const variant =
-      (row.reconstructor ? ` + ${row.reconstructor}` : "") + (told.length ? ` (${told.map(([key, value]) => (typeof value === "string" ? value : `${key} ${text(value)}`)).join(", ")})` : "");
+      (row.reconstructor ? ` + ${row.reconstructor}` : "") + (told.length ? ` (${told.map(([key, value]) => (typeof value === "string" ? value : `${key} ${typeof value === "number" ? short(value) : text(value)}`)).join(", ")})` : "");
     const blends = this.finest.filter(
       (other) => other.interpolant === row.interpolant && other.reconstructor === row.reconstructor && text(other.options) === text(row.options),
     );
@@ -103,7 +103,7 @@ export const frameSeconds = (row) => row.seconds.gradients + row.seconds.evaluat
 export function short(value) {
   if (value === null || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-2 || size >= 1e4)) return value.toExponential(2);
+  if (size !== 0 && (size < 1e-2 || size >= 1e5)) return value.toExponential(2).replace(/\.?0+e/, "e").replace("e+", "e");
   return String(Number(value.toPrecision(3)));
 }
 

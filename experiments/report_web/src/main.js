@@ -39,7 +39,8 @@ function runSection(run) {
     "A click on a title sorts." }));
   section.append(ruleTable(run));
   let viewer = null;
-  if (run.scene) {
+  // A line needs no view: a chart shows it.
+  if (run.scene && run.scene.columns !== 1) {
     section.append(element("h2", { textContent: "Side by side" }));
     const place = element("div");
     section.append(place);

@@ -34,6 +34,13 @@ class Side {
       this.object = new THREE.Points(this.geometry, this.material);
     }
     this.object.frustumCulled = false;
+    // The points' own edges share their positions.
+    const fineGeometry = new THREE.BufferGeometry();
+    fineGeometry.setAttribute("position", this.geometry.attributes.position);
+    fineGeometry.setIndex(new THREE.BufferAttribute(scene.fineEdges, 1));
+    this.fine = new THREE.LineSegments(fineGeometry, new THREE.LineBasicMaterial({ color: "#1b1f24", transparent: true, opacity: 0.25 }));
+    this.fine.frustumCulled = false;
+    this.fine.visible = false;
     this.cage = new Float32Array(scene.rest.vertices.length);
     const cageGeometry = new THREE.BufferGeometry();
     cageGeometry.setAttribute("position", new THREE.BufferAttribute(this.cage, 3));
@@ -42,7 +49,7 @@ class Side {
     this.wires.frustumCulled = false;
     const light = new THREE.DirectionalLight("#ffffff", 2.2), fill = new THREE.DirectionalLight("#dfe8ff", 0.8);
     viewer.lights.push([light, new THREE.Vector3(0.5, 0.9, 1)], [fill, new THREE.Vector3(-1, -0.4, 0.3)]);
-    this.world.add(this.object, this.wires, new THREE.AmbientLight("#ffffff", 0.75), light, fill);
+    this.world.add(this.object, this.fine, this.wires, new THREE.AmbientLight("#ffffff", 0.75), light, fill);
   }
 
   // Time 0 is rest, k the k-th stored frame, linear between.
@@ -68,11 +75,24 @@ class Side {
   }
 }
 
+/** The edges of triangles, each once. */
+function edgesOf(faces) {
+  const seen = new Set(), pairs = [];
+  for (let f = 0; f < faces.length; f += 3)
+    for (let i = 0; i < 3; ++i) {
+      const a = Math.min(faces[f + i], faces[f + ((i + 1) % 3)]), b = Math.max(faces[f + i], faces[f + ((i + 1) % 3)]);
+      const key = a * 67108864 + b;
+      if (!seen.has(key)) { seen.add(key); pairs.push(a, b); }
+    }
+  return Uint32Array.from(pairs);
+}
+
 /** Arrays of a scene as the viewer needs them; a plane's third coordinate is 0. */
 function unpack(scene) {
   const points = (array) => decodePositions(array, scene.columns);
+  const faces = decode(scene.faces);
   return {
-    faces: decode(scene.faces), edges: decode(scene.edges),
+    faces, edges: decode(scene.edges), fineEdges: edgesOf(faces),
     flatSpace: scene.columns < 3,
     rest: { points: decodePositions(scene.rest.points, scene.gdim), vertices: decodePositions(scene.rest.vertices, scene.gdim) },
     frames: scene.frames.map((frame) => ({ number: frame.number, vertices: points(frame.vertices), points: points(frame.truth) })),
@@ -95,8 +115,9 @@ export class Viewer {
     const contest = run.rules.filter((rule) => rule.reconstructor && !rule.isBound);
     const left = run.rules.find((rule) => !rule.reconstructor) ?? run.rules[0];
     const best = contest.reduce((a, b) => (a && run.finest[a.index].error.all.rms <= run.finest[b.index].error.all.rms ? a : b), null) ?? run.rules.at(-1);
-    const phong = contest.find((rule) => rule.interpolant === "phong" && rule.reconstructor === "chandrashekar_garg") ?? best;
-    this.chosen = [left.index, phong.index];
+    const paper = contest.filter((rule) => rule.interpolant === "phong" && rule.reconstructor === "chandrashekar_garg");
+    const right = paper.find((rule) => run.finest[rule.index].options.epsilon === 1) ?? paper[0] ?? best;
+    this.chosen = [left.index, right.index];
     const options = () => [element("option", { value: "truth", textContent: "truth" }), ...run.rules.map((rule) => element("option", { value: rule.index, textContent: rule.name }))];
     const selects = this.chosen.map((rule, side) => {
       const select = element("select", { id: side ? "right" : "left" }, ...options());
@@ -128,6 +149,8 @@ export class Viewer {
         for (const side of this.sides) { side.material.flatShading = on; side.material.needsUpdate = true; }
         this.draw();
       }));
+    if (scene.faces.length)
+      second.append(check("point mesh", "fine", false, (on) => { for (const side of this.sides) side.fine.visible = on; this.draw(); }));
     second.append(
       check("coarse cells", "wires", true, (on) => { for (const side of this.sides) side.wires.visible = on; this.draw(); }),
       check("logarithmic scale", "logarithmic", false, (on) => { this.logarithmic = on; this.update(); }),
