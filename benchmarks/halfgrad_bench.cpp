@@ -15,7 +15,9 @@
 #include "framework/cell_locator.hpp"
 #include "framework/error.hpp"
 #include "framework/interpolant.hpp"
+#include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
+#include "reconstruction/kriging.hpp"
 
 namespace halfgrad::benchmarks {
 namespace {
@@ -60,6 +62,14 @@ void run(const std::string& path, int rounds, std::int64_t max_points, int threa
   };
   auto linear = bound(float(), "linear"), phong = bound(float(), "phong"), hermite = bound(float(), "hermite");
   auto dual_taylor = bound(float(), "dual_taylor");
+  // What the stencils of other reconstructors cost.
+  const auto bound_with = [&](const VertexGradientReconstructor& reconstructor, const char* rule) {
+    const Reconstruction own = reconstructor.reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+    return Frame<float>{Interpolant<float>(mesh, embedding, named_rule(rule), &own), {}, {}};
+  };
+  auto phong_lean = bound_with(Kriging({.patch = KrigingPatch::lean}), "phong");
+  auto phong_kriging = bound_with(Kriging(), "phong"), phong_adaptive = bound_with(Adaptive(), "phong");
+  auto dual_taylor_kriging = bound_with(Kriging({.drift = KrigingDrift::cubic}), "dual_taylor");
   auto linear_user = bound(float(), "linear"), phong_user = bound(float(), "phong");
   auto phong_double = bound(double(), "phong");
   const Values<float> values = workload.deformed.cast<float>();
@@ -74,6 +84,10 @@ void run(const std::string& path, int rounds, std::int64_t max_points, int threa
       {"phong", frames, [&] { phong.sorted(values); }},
       {"hermite", frames, [&] { hermite.sorted(values); }},
       {"dual_taylor", frames, [&] { dual_taylor.sorted(values); }},
+      {"phong_lean", frames, [&] { phong_lean.sorted(values); }},
+      {"phong_kriging", frames, [&] { phong_kriging.sorted(values); }},
+      {"phong_adaptive", frames, [&] { phong_adaptive.sorted(values); }},
+      {"dual_taylor_kriging", frames, [&] { dual_taylor_kriging.sorted(values); }},
       {"phong_double", frames, [&] { phong_double.sorted(workload.deformed); }},
       {"linear_user_order", frames, [&] { linear_user.user_order(values); }},
       {"phong_user_order", frames, [&] { phong_user.user_order(values); }},

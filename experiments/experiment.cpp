@@ -7,8 +7,10 @@
 #include <numeric>
 
 #include "experiments/experiment_config.hpp"
+#include "experiments/hold_out.hpp"
 #include "experiments/html_report.hpp"
 #include "experiments/interactive_report.hpp"
+#include "experiments/recommendation.hpp"
 #include "experiments/report.hpp"
 #include "experiments/scene.hpp"
 #include "experiments/sequence_writer.hpp"
@@ -35,33 +37,21 @@ double median_seconds(int repetitions, Work&& work) {
 /// The deformed vertices and true points of a level, one frame at a time.
 class FrameSequence {
  public:
-  FrameSequence(const ExperimentConfig& config, const Mesh& mesh, const Points& points, int level)
-      : config_(config), mesh_(mesh), points_(points) {
+  FrameSequence(const ExperimentConfig& config, const Mesh& mesh, const Points& points, int level,
+                const HeldOutMesh* held_out)
+      : config_(config), mesh_(mesh), points_(points), held_out_(held_out) {
     if (!config.files) {
       numbers_.resize(config.fields.size());
       std::iota(numbers_.begin(), numbers_.end(), 0);
       return;
     }
     frames_ = open_frames(config.files->frames[level].string());
-    truth_ = open_frames(config.files->truth.string());
-    if (frames_->num_vertices() != mesh.num_vertices())
+    const Offset num_vertices = mesh.num_vertices() + (held_out == nullptr ? 0 : points.rows());
+    if (frames_->num_vertices() != num_vertices)
       raise("{}: frames of {} vertices, but the mesh has {}", config.files->frames[level].string(),
-            frames_->num_vertices(), mesh.num_vertices());
-    if (truth_->num_vertices() != points.rows())
-      raise("{}: {} true points, but there are {} points", config.files->truth.string(), truth_->num_vertices(),
-            points.rows());
-    if (truth_->num_frames() != frames_->num_frames() || truth_->num_columns() != frames_->num_columns())
-      raise("{}: {} frames of {} coordinates, but {} has {} of {}", config.files->truth.string(), truth_->num_frames(),
-            truth_->num_columns(), config.files->frames[level].string(), frames_->num_frames(), frames_->num_columns());
-    const int count = static_cast<int>(frames_->num_frames());
-    if (config.files->select.empty()) {
-      numbers_.resize(count);
-      std::iota(numbers_.begin(), numbers_.end(), 0);
-    }
-    for (const int number : config.files->select) {
-      numbers_.push_back(number < 0 ? count + number : number);
-      if (numbers_.back() < 0 || numbers_.back() >= count) raise("/field/select: frame {} of {} frames", number, count);
-    }
+            frames_->num_vertices(), num_vertices);
+    if (held_out == nullptr) open_truth(level);
+    select_frames();
   }
 
   const std::vector<int>& numbers() const { return numbers_; }
@@ -70,6 +60,11 @@ class FrameSequence {
     if (!config_.files) {
       values = field_values(*config_.fields[frame], mesh_.vertices());
       truth = field_values(*config_.fields[frame], points_);
+    } else if (held_out_ != nullptr) {
+      Points all;
+      frames_->read(frame, all);
+      values = all(held_out_->kept, Eigen::all);
+      truth = all(held_out_->held_out, Eigen::all);
     } else {
       frames_->read(frame, values);
       truth_->read(frame, truth);
@@ -77,9 +72,33 @@ class FrameSequence {
   }
 
  private:
+  void open_truth(int level) {
+    truth_ = open_frames(config_.files->truth.string());
+    if (truth_->num_vertices() != points_.rows())
+      raise("{}: {} true points, but there are {} points", config_.files->truth.string(), truth_->num_vertices(),
+            points_.rows());
+    if (truth_->num_frames() != frames_->num_frames() || truth_->num_columns() != frames_->num_columns())
+      raise("{}: {} frames of {} coordinates, but {} has {} of {}", config_.files->truth.string(), truth_->num_frames(),
+            truth_->num_columns(), config_.files->frames[level].string(), frames_->num_frames(),
+            frames_->num_columns());
+  }
+
+  void select_frames() {
+    const int count = static_cast<int>(frames_->num_frames());
+    if (config_.files->select.empty()) {
+      numbers_.resize(count);
+      std::iota(numbers_.begin(), numbers_.end(), 0);
+    }
+    for (const int number : config_.files->select) {
+      numbers_.push_back(number < 0 ? count + number : number);
+      if (numbers_.back() < 0 || numbers_.back() >= count) raise("/field/select: frame {} of {} frames", number, count);
+    }
+  }
+
   const ExperimentConfig& config_;
   const Mesh& mesh_;
   const Points& points_;
+  const HeldOutMesh* held_out_;
   std::unique_ptr<FrameSource> frames_, truth_;
   std::vector<int> numbers_;
 };
@@ -145,6 +164,23 @@ std::string element_names(const Mesh& mesh) {
   return names;
 }
 
+void add_gains(std::span<ResultRow> frame) {
+  const auto linear =
+      std::find_if(frame.begin(), frame.end(), [](const ResultRow& row) { return row.interpolant == "linear"; });
+  if (linear == frame.end()) return;
+  const std::array<RegionError, 3> reference = linear->error;
+  const double linear_seconds = linear->evaluate_seconds;
+  for (ResultRow& row : frame) {
+    if (linear_seconds > 0) row.time_over_linear = (row.gradients_seconds + row.evaluate_seconds) / linear_seconds;
+    for (int region = 0; region < 3; ++region) {
+      const RegionError& error = row.error[region];
+      if (reference[region].rms > 0 && error.rms > 0) row.gain_over_linear[region] = reference[region].rms / error.rms;
+      if (reference[region].max > 0 && error.max > 0)
+        row.max_gain_over_linear[region] = reference[region].max / error.max;
+    }
+  }
+}
+
 /// What a level gives besides its rows, where asked for.
 struct LevelOutputs {
   LevelPicture* picture = nullptr;
@@ -153,7 +189,7 @@ struct LevelOutputs {
   std::vector<std::string> files = {};         ///< written into it
 };
 
-/// One level of one configuration.
+/// One level of one configuration, or one fold of vertices held out.
 class LevelRun {
  public:
   LevelRun(const ExperimentConfig& config, int level, std::function<void(std::string_view, double)> progress)
@@ -163,10 +199,19 @@ class LevelRun {
         mesh_(config.mesh.make(level)),
         cloud_(config.points(mesh_, config.mesh.is_zoom ? 0 : level)) {}
 
+  LevelRun(const ExperimentConfig& config, const Mesh& whole, HeldOutMesh held_out,
+           std::function<void(std::string_view, double)> progress)
+      : config_(config),
+        level_(0),
+        progress_(std::move(progress)),
+        held_out_(std::move(held_out)),
+        mesh_(held_out_->mesh),
+        cloud_{whole.vertices()(held_out_->held_out, Eigen::all), {}} {}
+
   std::vector<ResultRow> run(LevelOutputs& outputs) {
     LevelPicture* const picture = outputs.picture;
     bind(picture);
-    FrameSequence frames(config_, mesh_, cloud_.positions, level_);
+    FrameSequence frames(config_, mesh_, cloud_.positions, level_, held_out_ ? &*held_out_ : nullptr);
     std::vector<ResultRow> rows;
     Points values, truth;
     const std::vector<int>& numbers = frames.numbers();
@@ -190,7 +235,7 @@ class LevelRun {
       }
       if (recorder && recorder->wants(f)) recorder->add(numbers[f], values, truth, results);
       if (writer) writer->add(values, truth, results);
-      add_gains(rows, first);
+      add_gains(std::span(rows).subspan(first));
     }
     if (recorder) *outputs.scene = recorder->text();
     if (writer) outputs.files = writer->finish();
@@ -326,28 +371,10 @@ class LevelRun {
     return row;
   }
 
-  static void add_gains(std::vector<ResultRow>& rows, std::size_t first) {
-    const auto linear = std::find_if(rows.begin() + static_cast<std::ptrdiff_t>(first), rows.end(),
-                                     [](const ResultRow& row) { return row.interpolant == "linear"; });
-    if (linear == rows.end()) return;
-    const std::array<RegionError, 3> reference = linear->error;
-    const double linear_seconds = linear->evaluate_seconds;
-    for (std::size_t r = first; r < rows.size(); ++r) {
-      if (linear_seconds > 0)
-        rows[r].time_over_linear = (rows[r].gradients_seconds + rows[r].evaluate_seconds) / linear_seconds;
-      for (int region = 0; region < 3; ++region) {
-        const RegionError& error = rows[r].error[region];
-        if (reference[region].rms > 0 && error.rms > 0)
-          rows[r].gain_over_linear[region] = reference[region].rms / error.rms;
-        if (reference[region].max > 0 && error.max > 0)
-          rows[r].max_gain_over_linear[region] = reference[region].max / error.max;
-      }
-    }
-  }
-
   const ExperimentConfig& config_;
   int level_;
   std::function<void(std::string_view, double)> progress_;
+  std::optional<HeldOutMesh> held_out_;
   Mesh mesh_;
   PointCloud cloud_;
   std::vector<PointPlace> places_;
@@ -361,7 +388,7 @@ bool wants(const ExperimentConfig& config, OutputKind kind) {
 /// report.html, and scene.json so that `halfgrad report` can show the run beside others.
 void write_html(const std::filesystem::path& directory, ExperimentResult& result) {
   std::string page;
-  if (report_script().empty()) {
+  if (report_script().empty() || result.scene.empty()) {
     page = results_html(result.name, {&result, 1});
   } else {
     const ReportedRun run{results_json(result), result.scene};
@@ -369,6 +396,30 @@ void write_html(const std::filesystem::path& directory, ExperimentResult& result
     write_report(directory / "scene.json", result.scene, result.files);
   }
   write_report(directory / "report.html", page, result.files);
+}
+
+/// The rows of all folds, pooled.
+std::vector<ResultRow> run_folds(const ExperimentConfig& config, const RunOptions& options) {
+  const Mesh mesh = config.mesh.make(0);
+  std::vector<ResultRow> rows;
+  for (int fold = 0; fold < config.num_folds; ++fold) {
+    const auto progress = [&](std::string_view stage, double fraction) {
+      if (options.progress) options.progress(stage, (fold + fraction) / config.num_folds);
+    };
+    HeldOutMesh held_out = hold_out(mesh, config.seed + static_cast<std::uint64_t>(fold));
+    LevelOutputs none;
+    const std::vector<ResultRow> more = LevelRun(config, mesh, std::move(held_out), progress).run(none);
+    if (fold == 0)
+      rows = more;
+    else
+      pool_fold(rows, more);
+  }
+  // Rows of a frame stand together.
+  for (std::size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
+    while (end < rows.size() && rows[end].frame == rows[begin].frame) ++end;
+    add_gains(std::span(rows).subspan(begin, end - begin));
+  }
+  return rows;
 }
 
 }  // namespace
@@ -380,8 +431,12 @@ ExperimentResult run_experiment(const std::filesystem::path& path, const RunOpti
   result.config = config.resolved;
   if (options.check_only) return result;
 
-  const int num_levels = config.mesh.num_levels;
   LevelPicture picture;
+  if (config.num_folds > 0) {
+    result.rows = run_folds(config, options);
+    result.recommendation = recommend(result.rows);
+  }
+  const int num_levels = config.num_folds > 0 ? 0 : config.mesh.num_levels;
   for (int level = 0; level < num_levels; ++level) {
     const auto progress = [&](std::string_view stage, double fraction) {
       if (options.progress) options.progress(stage, (level + fraction) / num_levels);
@@ -403,7 +458,7 @@ ExperimentResult run_experiment(const std::filesystem::path& path, const RunOpti
   result.expectations = check_expectations(config.expectations, result.rows, result.orders);
   if (!options.out_directory.empty()) {
     std::filesystem::create_directories(options.out_directory);
-    if (wants(config, OutputKind::vtu)) write_pictures(options.out_directory, picture, result.files);
+    if (wants(config, OutputKind::vtu) && num_levels > 0) write_pictures(options.out_directory, picture, result.files);
     if (wants(config, OutputKind::csv))
       write_report(options.out_directory / "results.csv", results_csv(result), result.files);
     if (wants(config, OutputKind::html)) write_html(options.out_directory, result);

@@ -54,7 +54,7 @@ MadeReconstructor read_reconstructor(const json& specification, const std::strin
   return {"exact", "{}", nullptr};
 }
 
-FrameFiles read_frame_files(const json& specification, const std::string& pointer, int num_levels,
+FrameFiles read_frame_files(const json& specification, const std::string& pointer, int num_levels, bool with_truth,
                             const std::filesystem::path& directory, json& resolved) {
   JsonReader reader(specification, pointer);
   FrameFiles files;
@@ -62,7 +62,7 @@ FrameFiles read_frame_files(const json& specification, const std::string& pointe
   if (static_cast<int>(files.frames.size()) != num_levels)
     raise("{}: found {} files, expected one for each of the {} meshes", reader.pointer_to("frames"),
           files.frames.size(), num_levels);
-  files.truth = directory / reader.text("truth");
+  if (with_truth) files.truth = directory / reader.text("truth");
   if (const json* select = reader.find("select")) {
     const auto whole = [](const json& entry) { return entry.is_number_integer(); };
     if (!select->is_array() || select->empty() || !std::all_of(select->begin(), select->end(), whole))
@@ -112,6 +112,21 @@ std::vector<OutputKind> read_outputs(JsonReader& reader) {
   return outputs;
 }
 
+/// The number of folds of "hold_out", 0 where it is absent.
+int read_folds(JsonReader& reader, const MeshSource& mesh) {
+  const json* specification = reader.find("hold_out");
+  if (specification == nullptr) return 0;
+  if (reader.has("points"))
+    raise("/points: with \"hold_out\" the points are vertices of the mesh; leave one of them out");
+  if (mesh.num_levels != 1) raise("/hold_out: found {} levels of the mesh, expected one", mesh.num_levels);
+  JsonReader options(*specification, "/hold_out");
+  const std::int64_t folds = options.integer("folds", 4);
+  if (folds < 1 || folds > 100) raise("/hold_out/folds: found {}, expected 1 to 100", folds);
+  options.finish();
+  reader.record("hold_out", options.resolved());
+  return static_cast<int>(folds);
+}
+
 ExperimentConfig read_config(const json& document, const std::filesystem::path& directory, const std::string& stem) {
   JsonReader reader(document, "");
   ExperimentConfig config;
@@ -125,13 +140,17 @@ ExperimentConfig read_config(const json& document, const std::filesystem::path& 
   json resolved;
   config.mesh = read_mesh_source(reader.at("mesh"), "/mesh", directory, config.seed, resolved);
   reader.record("mesh", resolved);
-  config.points = read_point_source(reader.has("points") ? reader.at("points") : json{{"random", json::object()}},
-                                    "/points", directory, config.seed, resolved);
-  reader.record("points", resolved);
+  config.num_folds = read_folds(reader, config.mesh);
+  if (config.num_folds == 0) {
+    config.points = read_point_source(reader.has("points") ? reader.at("points") : json{{"random", json::object()}},
+                                      "/points", directory, config.seed, resolved);
+    reader.record("points", resolved);
+  }
 
   const json& field = reader.at("field");
   if (field.is_object() && (field.contains("frames") || field.contains("truth"))) {
-    config.files = read_frame_files(field, "/field", config.mesh.num_levels, directory, resolved);
+    config.files =
+        read_frame_files(field, "/field", config.mesh.num_levels, config.num_folds == 0, directory, resolved);
   } else {
     // Only the file knows the dimension of a mesh that is read.
     if (config.mesh.gdim == 0) config.mesh.gdim = config.mesh.make(0).gdim();

@@ -21,8 +21,8 @@ namespace halfgrad {
 /// Deformed vertices and true points from files.
 struct FrameFiles {
   std::vector<std::filesystem::path> frames;  ///< one a level
-  std::filesystem::path truth;
-  std::vector<int> select;  ///< frame numbers, negative ones from the end; empty is all
+  std::filesystem::path truth;                ///< empty where vertices are held out
+  std::vector<int> select;                    ///< frame numbers, negative ones from the end; empty is all
 };
 
 enum class OutputKind : std::uint8_t { json, csv, html, vtu, sequence };
@@ -31,7 +31,8 @@ struct ExperimentConfig {
   std::string name;
   std::uint64_t seed = 0;
   MeshSource mesh;
-  PointSource points;
+  PointSource points;                          ///< none where vertices are held out
+  int num_folds = 0;                           ///< how often vertices are held out as points; 0 is not at all
   std::vector<std::unique_ptr<Field>> fields;  ///< one a frame; none where files give the frames
   std::optional<FrameFiles> files;             ///< none where a field does
   std::vector<ConfiguredInterpolant> interpolants;

@@ -72,6 +72,22 @@ struct ResultExpectation {
   bool holds = false;
 };
 
+/// A rule and what it gained over linear.
+struct MeasuredRule {
+  std::string interpolant;
+  std::string reconstructor, options;
+  double gain = 1;  ///< geometric mean over the frames
+};
+
+/// Which rule to take, and why.
+struct Recommendation {
+  MeasuredRule chosen, best;
+  std::optional<MeasuredRule> safe;  ///< phong with adaptive, where it was measured
+  Index points = 0;                  ///< held out, all folds
+  int frames = 0;                    ///< that count
+  std::string reason;
+};
+
 /// All of it.
 struct ExperimentResult {
   std::string name;
@@ -80,6 +96,7 @@ struct ExperimentResult {
   std::vector<ResultRow> rows;
   std::vector<ResultOrder> orders;
   std::vector<ResultExpectation> expectations;
+  std::optional<Recommendation> recommendation;  ///< of runs that hold out vertices
   std::string scene;               ///< of the finest level for the interactive report, JSON; empty where not asked for
   std::vector<std::string> files;  ///< written
 

@@ -143,6 +143,20 @@ TYPED_TEST(ReconstructorContract, AdaptiveGradientsAreContinuousInTheValues) {
   EXPECT_LT(greatest_step(256), 0.2 * greatest_step(16));
 }
 
+TYPED_TEST(ReconstructorContract, AdaptiveGradientsDoNotDependOnConstantColumns) {
+  // A column without differences adds no roughness; four columns take the general code, two and three the fast one.
+  const Mesh mesh = this->mesh();
+  const Reconstruction rows = reconstruct("adaptive", mesh);
+  const Values<double> values = wave(mesh);
+  Values<double> wider = Values<double>::Constant(values.rows(), 4, 1);
+  wider.leftCols(values.cols()) = values;
+  const Values<double> found = gradients(rows, values), more = gradients(rows, wider),
+                       three = gradients(rows, wider.leftCols(3));
+  const double size = found.cwiseAbs().maxCoeff();
+  EXPECT_LT((more.leftCols(found.cols()) - found).cwiseAbs().maxCoeff(), 1e-12 * size);
+  EXPECT_LT((more.leftCols(three.cols()) - three).cwiseAbs().maxCoeff(), 1e-12 * size);
+}
+
 TYPED_TEST(ReconstructorContract, CubicDriftIsExactForCubicsAndTheirHessians) {
   const Mesh mesh = this->mesh(TypeParam::dim == 3 ? 4 : 6);
   const Polynomial polynomial{3};
