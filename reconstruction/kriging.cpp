@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numeric>
 
 #include "framework/error.hpp"
+#include "reconstruction/cell_averages.hpp"
 #include "reconstruction/kriging_system.hpp"
 #include "reconstruction/row_assembly.hpp"
 #include "reconstruction/symmetric_eigen.hpp"
@@ -147,24 +147,14 @@ class KrigingRow {
       points_.col(static_cast<Eigen::Index>(j)) = metric_ * (cells_->vertices().row(patch_[j]) - origin).transpose();
   }
 
-  // The volume-weighted mean of the gradients of the cells at the vertex and at its neighbours. All vertices of one or
-  // two cells get the same one, which makes interpolants linear there: never worse than linear. False where no cell is
-  // usable.
-  bool fall_back(Index vertex, StencilRow& row) {
-    const auto near_cells = cells_->cells_of(vertex);
-    std::vector<Index> cells(near_cells.begin(), near_cells.end());
-    for (Index v : rings_.within(1)) cells.insert(cells.end(), cells_->cells_of(v).begin(), cells_->cells_of(v).end());
-    std::sort(cells.begin(), cells.end());
-    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
-    std::vector<double> weights;
-    for (Index cell : cells) weights.push_back(cells_->gradient(cell).volume);
-    const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
-    if (!(total > 0)) return false;
-    for (double& weight : weights) weight /= total;
-    compose_row(*cells_, vertex, cells, weights, row);
+  // The volume-weighted mean of the adjacent cells' gradients. False where no cell is usable.
+  bool fall_back(Index vertex, StencilRow& row) const {
+    const CellWeights average = VolumeAverage().weights(*cells_, vertex);
+    if (average.cells.empty()) return false;
+    compose_row(*cells_, vertex, average.cells, average.weights, row);
     const Eigen::Index gdim = cells_->gdim(), count = static_cast<Eigen::Index>(row.neighbors.size());
-    const Eigen::Map<const Eigen::MatrixXd> composed(row.weights.data(), gdim, count);
-    row.diagnostics.absolute_sum = static_cast<float>(composed.colwise().norm().sum() * scale_);
+    const Eigen::Map<const Eigen::MatrixXd> weights(row.weights.data(), gdim, count);
+    row.diagnostics.absolute_sum = static_cast<float>(weights.colwise().norm().sum() * scale_);
     row.diagnostics.rule = StencilRule::cell_value;
     row.diagnostics.num_points = static_cast<Index>(count);
     row.hessian_weights.assign(best_.hessian.rows() * count, 0.0);

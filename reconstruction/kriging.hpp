@@ -25,7 +25,7 @@ struct KrigingOptions {
 /// Polynomial drift exactly, a Matérn-7/2 prior for the rest, on the nearest vertices of the rings around a vertex.
 /// Exact for polynomials of the drift's degree wherever a patch determines them, boundary included; what it does not
 /// determine is damped continuously. A vertex whose patch has next to no quadratic modes falls back to the
-/// volume-weighted mean of the cells around. The method and its constants are described in docs/kriging.md.
+/// volume-weighted mean of its cells. The method and its constants are described in docs/kriging.md.
 class Kriging final : public VertexGradientReconstructor {
  public:
   /// Throws Error for a cubic drift on lean patches.
