@@ -24,6 +24,12 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/halfgradConfigVersion.cma
 install(FILES ${PROJECT_BINARY_DIR}/halfgradConfig.cmake ${PROJECT_BINARY_DIR}/halfgradConfigVersion.cmake
         DESTINATION ${package_directory} COMPONENT development)
 
+foreach(package "halfgrad program" "libhalfgrad-dev development")
+  separate_arguments(words UNIX_COMMAND "${package}")
+  list(POP_FRONT words name component)
+  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} RENAME copyright COMPONENT ${component})
+endforeach()
+
 # Debian packages: cpack in the build directory, after a build of all.
 set(CPACK_PACKAGE_CONTACT "The halfgrad authors <noreply@example.org>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
@@ -35,10 +41,13 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME halfgrad)
+set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "The halfgrad program: carries points through sequences of deformed meshes,
+ exports the map for other programs, and measures interpolants.")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libhalfgrad-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
+set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "The library with its headers, for find_package(halfgrad).")
 # The packages of what halfgradConfig.cmake looks for.
 string(JOIN ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4)" libfmt-dev nlohmann-json3-dev
        libtbb-dev libhwy-dev libfast-float-dev libpugixml-dev zlib1g-dev)
