@@ -110,23 +110,27 @@ void name_arguments(CLI::App& app) {
 // Says what was wrong with the command line and what to type next.
 [[noreturn]] void refuse_usage(const CLI::App& program, const CLI::ParseError& error) {
   const std::vector<CLI::App*> parsed = program.get_subcommands();
-  const CommandFacts shared = facts_of(program);
-  std::vector<std::string> names;
-  if (parsed.empty()) {
-    for (const CommandFacts& command : facts_of_program(program).commands) names.push_back(command.name);
-  } else {
-    for (const CommandFacts& facts : {facts_of(*parsed.front()), shared})
-      for (const OptionFacts& option : facts.options)
-        if (!option.positional()) names.push_back(option.name);
-  }
-  const std::string command = parsed.empty() ? "halfgrad" : "halfgrad " + parsed.front()->get_name();
+  const ProgramFacts facts = facts_of_program(program);
+  const CommandFacts command = parsed.empty() ? facts.shared : facts_of(*parsed.front());
+  const std::string name = parsed.empty() ? "halfgrad" : "halfgrad " + command.name;
+  const std::string more = fmt::format("see {} --help", name) +
+                           (command.example.empty() ? "" : fmt::format(", or for example: {}", command.example));
+
   const std::vector<std::string> unknown = program.remaining(true);
-  if (unknown.empty()) raise("{}; see {} --help", error.what(), command);
+  if (unknown.empty())
+    raise("{}{}; {}", error.what(), error.get_name() == "ConversionError" ? ", expected a number" : "", more);
+  const std::string& word = unknown.front();
+  if (!parsed.empty() && word.front() != '-') raise("{}: expected an option before it; {}", word, more);
+  std::vector<std::string> names;
+  if (parsed.empty())
+    for (const CommandFacts& known : facts.commands) names.push_back(known.name);
+  for (const std::vector<OptionFacts>& options : {command.options, facts.shared.options})
+    for (const OptionFacts& option : options)
+      if (!option.positional()) names.push_back(option.name);
   const std::vector<std::string_view> known(names.begin(), names.end());
-  const std::string nearest = nearest_name(unknown.front(), known);
-  raise("{} is no {} of {}{}; see {} --help", unknown.front(), parsed.empty() ? "command" : "option", command,
-        nearest.empty() ? fmt::format(", known: {}", join_names(known)) : fmt::format("; did you mean {}?", nearest),
-        command);
+  const std::string nearest = nearest_name(word, known);
+  raise("{} is no {} of {}; {}; {}", word, parsed.empty() ? "command" : "option", name,
+        nearest.empty() ? fmt::format("known: {}", join_names(known)) : fmt::format("did you mean {}?", nearest), more);
 }
 
 int dispatch(int argc, char** argv) {
@@ -163,9 +167,10 @@ int dispatch(int argc, char** argv) {
     app->add_option("--interpolant", bind.interpolant,
                     "A name, or JSON with options; see halfgrad list interpolants (default: phong)");
     app->add_option("--alpha", bind.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
-    app->add_option("--reconstructor", bind.reconstructor,
-                    "A name or JSON; see halfgrad list reconstructors (default: " + preferred +
-                        "; for dual_taylor kriging with cubic drift)");
+    app->add_option(
+        "--reconstructor", bind.reconstructor,
+        "A name, or JSON such as '{\"kriging\": {\"drift\": \"cubic\"}}'; see halfgrad list reconstructors (default: " +
+            preferred + "; for dual_taylor kriging with cubic drift)");
     app->add_option("--outside", bind.outside, "Points outside the mesh: error, nearest or mark (default: error)");
   };
   DeformOptions options;
@@ -253,7 +258,7 @@ int dispatch(int argc, char** argv) {
   CLI::App* describe_app =
       program.add_subcommand("describe", "Print shell completion, the manual page or the command reference");
   describe_app->add_option("format", format, "bash, zsh, fish, man or markdown")->required();
-  describe_app->footer("Example: source <(halfgrad describe bash)");
+  describe_app->footer("Example: halfgrad describe bash > ~/.local/share/bash-completion/completions/halfgrad");
 
   name_arguments(program);
   for (CLI::App* command_app : program.get_subcommands([](CLI::App*) { return true; })) name_arguments(*command_app);

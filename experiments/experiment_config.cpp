@@ -1,10 +1,10 @@
 #include "experiments/experiment_config.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
+#include "framework/io/input_file.hpp"
 #include "framework/json_reader.hpp"
 
 namespace halfgrad {
@@ -14,10 +14,9 @@ using nlohmann::json;
 namespace {
 
 json read_json_file(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file) raise("{}: cannot be read", path.string());
+  const InputFile file(path);
   try {
-    return json::parse(file);
+    return json::parse(file.bytes());
   } catch (const json::parse_error& error) {
     raise("{}: not JSON: {}", path.string(), error.what());
   }

@@ -253,7 +253,7 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
     const GradientStencilTable& table = reconstruction->stencils;
     if (table.gdim != mesh.gdim()) raise("stencils of dimension {} for a mesh of {}", table.gdim, mesh.gdim());
     if (rule.needs_hessians() && !table.has_hessians() && table.num_rows() > 0)
-      raise("dual_taylor needs vertex Hessians: use the reconstructor kriging with \"drift\": \"cubic\"");
+      raise("dual_taylor needs vertex Hessians: use the reconstructor {{\"kriging\": {{\"drift\": \"cubic\"}}}}");
     binding->has_gradients = true;
     if (reconstruction->blend)
       binding->blended = select_rows(*reconstruction, binding->vertices);

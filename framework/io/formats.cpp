@@ -81,12 +81,21 @@ const Format& find_format(const std::filesystem::path& path, FormatUse use) {
     if (named) known_as = format.name;
     if (serves(format, use)) serving.insert(serving.end(), format.extensions.begin(), format.extensions.end());
   }
+  if (std::error_code ignored; use != FormatUse::create_frames && std::filesystem::is_directory(path, ignored))
+    raise("{}: found a folder, expected a file{}", path.string(),
+          use == FormatUse::open_frames
+              ? fmt::format(" or a pattern of its files such as {}", (path / "*.vtu").string())
+              : "");
   const std::string nearest = nearest_name(extension, serving);
   const std::string found = !known_as.empty()   ? fmt::format("{} ({})", extension, known_as)
                             : extension.empty() ? "a name without extension"
                                                 : fmt::format("the unknown extension {}", extension);
-  raise("{}: found {}, but {} {}{}", path.string(), found, verb(use), join_names(serving),
-        known_as.empty() && !extension.empty() && !nearest.empty() ? fmt::format("; did you mean {}?", nearest) : "");
+  // .inp is no misspelt .vtp: only names that begin alike are taken for mistakes.
+  const bool alike = known_as.empty() && extension.size() > 1 && nearest.size() > 1 && extension[1] == nearest[1];
+  const bool foreign = known_as.empty() && !extension.empty() && !alike && use != FormatUse::create_frames;
+  raise("{}: found {}, but {} {}{}{}", path.string(), found, verb(use), join_names(serving),
+        alike ? fmt::format("; did you mean {}?", nearest) : "",
+        foreign ? "; meshio (\"meshio convert FILE out.vtu\") turns many other formats into one of them" : "");
 }
 
 std::unique_ptr<FrameSink> create_frames(const std::filesystem::path& path, const PointSet& shape,
