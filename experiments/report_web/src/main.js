@@ -40,7 +40,13 @@ function runSection(run) {
   const section = element("section");
   const description = run.results.config?.description;
   if (description) section.append(element("p", { textContent: description }));
-  section.append(facts(run), element("h2", { textContent: "Rules" }));
+  section.append(facts(run));
+  const { recommendation } = run.results;
+  if (recommendation) {
+    const name = recommendation.interpolant + (recommendation.reconstructor ? ` + ${recommendation.reconstructor}` : "");
+    section.append(element("p", { className: "recommended" }, "For this mesh and motion ", element("b", { textContent: name, title: JSON.stringify(recommendation.options) }), `: ${recommendation.reason}.`));
+  }
+  section.append(element("h2", { textContent: "Rules" }));
   section.append(element("p", { className: "note", textContent:
     "The finest level" + (run.frames > 1 ? " and last frame" : "") +
     ". The best of each column is marked. Gain: rms error of linear interpolation over the rule's. " +
