@@ -38,12 +38,12 @@ std::int64_t carry_frames(const DeformOptions& options, const ScatteredTransfer&
 }
 
 /// A name, or JSON with options.
-json parse_interpolant(const std::string& text) {
+json parse_name(const std::string& text, const char* option) {
   if (text.empty() || text[0] != '{') return text;
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
-    raise("--interpolant {}: {}", text, error.what());
+    raise("{} {}: {}", option, text, error.what());
   }
 }
 
@@ -51,7 +51,8 @@ json parse_interpolant(const std::string& text) {
 
 bool is_scattered(const std::string& interpolant) {
   json ignored;
-  const ConfiguredInterpolant named = read_interpolant(parse_interpolant(interpolant), "--interpolant", ignored);
+  const ConfiguredInterpolant named =
+      read_interpolant(parse_name(interpolant, "--interpolant"), "--interpolant", ignored);
   if (!named.scattered && interpolant != named.name)
     raise("--interpolant {}: {} takes no options in JSON (vertex_blend takes --alpha)", interpolant, named.name);
   return named.scattered.has_value();
@@ -60,7 +61,7 @@ bool is_scattered(const std::string& interpolant) {
 void deform_scattered(const DeformOptions& options) {
   json resolved;
   const ConfiguredInterpolant interpolant =
-      read_interpolant(parse_interpolant(*options.bind.interpolant), "--interpolant", resolved);
+      read_interpolant(parse_name(*options.bind.interpolant, "--interpolant"), "--interpolant", resolved);
   const auto refuse = [&](bool given, const char* option) {
     if (given) raise("{}: {} knows vertices only and does not take it", option, interpolant.name);
   };
@@ -81,9 +82,7 @@ void deform_scattered(const DeformOptions& options) {
   std::optional<MadeReconstructor> made;
   if (interpolant.needs_gradients()) {
     const std::string& name = options.bind.reconstructor;
-    made = make_reconstructor(name.empty()     ? json("chandrashekar_garg")
-                              : name[0] == '{' ? json::parse(name)
-                                               : json(name),
+    made = make_reconstructor(parse_name(name.empty() ? "chandrashekar_garg" : name, "--reconstructor"),
                               "--reconstructor");
   }
 

@@ -385,15 +385,15 @@ bool wants(const ExperimentConfig& config, OutputKind kind) {
   return std::find(config.outputs.begin(), config.outputs.end(), kind) != config.outputs.end();
 }
 
-/// report.html, and scene.json so that `halfgrad report` can show the run beside others.
+/// report.html, and scene.json where there is a level to show, so that `halfgrad report` can show the run beside others.
 void write_html(const std::filesystem::path& directory, ExperimentResult& result) {
   std::string page;
-  if (report_script().empty() || result.scene.empty()) {
+  if (report_script().empty()) {
     page = results_html(result.name, {&result, 1});
   } else {
     const ReportedRun run{results_json(result), result.scene};
     page = interactive_html(result.name, {&run, 1});
-    write_report(directory / "scene.json", result.scene, result.files);
+    if (!result.scene.empty()) write_report(directory / "scene.json", result.scene, result.files);
   }
   write_report(directory / "report.html", page, result.files);
 }

@@ -42,9 +42,12 @@ void pool_fold(std::vector<ResultRow>& rows, std::span<const ResultRow> fold) {
       RegionError& sum = rows[r].error[region];
       const RegionError& added = fold[r].error[region];
       const double squares = sum.points * sum.rms * sum.rms + added.points * added.rms * added.rms;
+      const double total = sum.points * sum.mean + added.points * added.mean;
       sum.points += added.points;
       sum.max = std::max(sum.max, added.max);
-      if (sum.points > 0) sum.rms = std::sqrt(squares / sum.points);
+      if (sum.points == 0) continue;
+      sum.rms = std::sqrt(squares / sum.points);
+      sum.mean = total / sum.points;
     }
   }
 }

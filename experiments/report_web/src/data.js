@@ -31,6 +31,25 @@ const symbols = { linear: "circle", phong: "square", hermite: "triangle", dual_t
 
 const text = (value) => (typeof value === "string" ? value : JSON.stringify(value));
 
+/** The reconstructor, with the options that tell it from others of its name among `rows`. */
+function variantName(row, rows) {
+  const same = rows.filter((other) => other.reconstructor === row.reconstructor && (row.reconstructor || other.interpolant === row.interpolant));
+  const told = Object.entries(row.options).filter(([key, value]) => same.some((other) => text(other.options[key]) !== text(value)));
+  const words = told.map(([key, value]) => (typeof value === "string" ? value : `${key} ${typeof value === "number" ? short(value) : text(value)}`));
+  return (row.reconstructor ? ` + ${row.reconstructor}` : "") + (words.length ? ` (${words.join(", ")})` : "");
+}
+
+/** Gives every rule of several runs a name that means the same in all of them. */
+export function nameAcross(runs) {
+  const rows = runs.flatMap((run) => run.finest);
+  for (const run of runs)
+    for (const rule of run.rules) {
+      const row = run.finest[rule.index];
+      const blend = row.interpolant === "vertex_blend" && row.alpha !== 1 ? ` ${row.alpha}` : "";
+      rule.sharedName = row.interpolant + blend + variantName(row, rows);
+    }
+}
+
 /** One run: its rules, its rows grouped, its finest level and last frame. */
 export class Run {
   constructor({ results, scene }) {
@@ -53,16 +72,8 @@ export class Run {
     this.rules = this.finest.map((row, index) => this.#describe(row, index));
   }
 
-  // Options are named where they tell rules of one reconstructor apart.
   #describe(row, index) {
-    const same = this.finest.filter(
-      (other) => other.reconstructor === row.reconstructor && (row.reconstructor || other.interpolant === row.interpolant),
-    );
-    const told = Object.entries(row.options).filter(([key, value]) =>
-      same.some((other) => text(other.options[key]) !== text(value)),
-    );
-    const variant =
-      (row.reconstructor ? ` + ${row.reconstructor}` : "") + (told.length ? ` (${told.map(([key, value]) => (typeof value === "string" ? value : `${key} ${typeof value === "number" ? short(value) : text(value)}`)).join(", ")})` : "");
+    const variant = variantName(row, this.finest);
     const blends = this.finest.filter(
       (other) => other.interpolant === row.interpolant && other.reconstructor === row.reconstructor && text(other.options) === text(row.options),
     );

@@ -1,7 +1,7 @@
 // Builds the page from the data that halfgrad wrote into it.
 import css from "./style.css";
 import { chartSection } from "./charts.js";
-import { Run, element, short } from "./data.js";
+import { Run, element, nameAcross, short } from "./data.js";
 import { overviewTable, ruleTable } from "./table.js";
 import { Viewer } from "./viewer.js";
 
@@ -17,11 +17,20 @@ function facts(run) {
   return element("p", { className: "facts", textContent: parts.filter(Boolean).join(" · ") });
 }
 
+/** What an expectation selects, in words. */
+function selected(expect) {
+  const words = Object.entries(expect).filter(([key]) => !/_at_(least|most)$/.test(key)).map(([key, value]) =>
+    key === "interpolant" || key === "reconstructor" || key === "region" || key === "norm" ? value
+      : key === "options" ? Object.entries(value).map(([option, setting]) => `${option} ${setting}`).join(" ")
+      : `${key} ${value}`);
+  return words.join(", ") || "all rules";
+}
+
 function expectations(run) {
   const list = run.results.expect.map((expected) =>
     element("li", {},
       element("span", { className: expected.holds ? "holds" : "fails", textContent: expected.holds ? "holds" : "does not hold" }),
-      " ", element("code", { textContent: JSON.stringify(expected.expect) }), ` measured ${short(expected.measured)}`),
+      ` ${selected(expected.expect)}: `, element("code", { textContent: `${expected.bound.replace("_at_least", " ≥").replace("_at_most", " ≤")} ${short(expected.limit)}` }), `, measured ${short(expected.measured)}`),
   );
   const held = run.results.expect.filter((expected) => expected.holds).length;
   return [element("h2", { textContent: `Expectations: ${held} of ${list.length} hold` }), element("ul", {}, ...list)];
@@ -31,7 +40,13 @@ function runSection(run) {
   const section = element("section");
   const description = run.results.config?.description;
   if (description) section.append(element("p", { textContent: description }));
-  section.append(facts(run), element("h2", { textContent: "Rules" }));
+  section.append(facts(run));
+  const { recommendation } = run.results;
+  if (recommendation) {
+    const name = recommendation.interpolant + (recommendation.reconstructor ? ` + ${recommendation.reconstructor}` : "");
+    section.append(element("p", { className: "recommended" }, "For this mesh and motion ", element("b", { textContent: name, title: JSON.stringify(recommendation.options) }), `: ${recommendation.reason}.`));
+  }
+  section.append(element("h2", { textContent: "Rules" }));
   section.append(element("p", { className: "note", textContent:
     "The finest level" + (run.frames > 1 ? " and last frame" : "") +
     ". The best of each column is marked. Gain: rms error of linear interpolation over the rule's. " +
@@ -72,6 +87,7 @@ function main() {
     window.halfgradViewer = shown.viewer;
   };
   if (runs.length > 1) {
+    nameAcross(runs);
     const choice = element("select", { id: "run" }, ...runs.map((run, i) => element("option", { value: i, textContent: run.name })));
     choice.onchange = () => show(runs[choice.value]);
     page.append(overviewTable(runs), element("div", { className: "bar", style: "margin-top:1.6em" }, element("label", {}, "Run", choice)));

@@ -61,14 +61,14 @@ export function ruleTable(run) {
 
 /** Gain over linear, a line a rule and a column a run. */
 export function overviewTable(runs) {
-  const names = [...new Set(runs.flatMap((run) => run.rules.map((rule) => rule.name)))];
+  const names = [...new Set(runs.flatMap((run) => run.rules.map((rule) => rule.sharedName)))];
   const gain = (run, name) => {
-    const rule = run.rules.find((other) => other.name === name);
+    const rule = run.rules.find((other) => other.sharedName === name);
     return rule ? run.finest[rule.index].gain_over_linear.all ?? NaN : NaN;
   };
-  const best = runs.map((run) => Math.max(...run.rules.filter((rule) => !rule.isBound).map((rule) => gain(run, rule.name)).filter(Number.isFinite)));
+  const best = runs.map((run) => Math.max(...run.rules.filter((rule) => !rule.isBound).map((rule) => gain(run, rule.sharedName)).filter(Number.isFinite)));
   const lines = names.map((name) =>
-    element("tr", {}, element("td", { textContent: name }), ...runs.map((run, i) => {
+    element("tr", { className: name.includes(" + exact") ? "bound" : "" }, element("td", { textContent: name }), ...runs.map((run, i) => {
       const value = gain(run, name);
       return element("td", { textContent: short(value), className: value === best[i] ? "best" : "" });
     })),

@@ -40,7 +40,7 @@ class Side {
     fineGeometry.setIndex(new THREE.BufferAttribute(scene.fineEdges, 1));
     this.fine = new THREE.LineSegments(fineGeometry, new THREE.LineBasicMaterial({ color: "#1b1f24", transparent: true, opacity: 0.25 }));
     this.fine.frustumCulled = false;
-    this.fine.visible = false;
+    this.fine.visible = scene.flatSpace;
     this.cage = new Float32Array(scene.rest.vertices.length);
     const cageGeometry = new THREE.BufferGeometry();
     cageGeometry.setAttribute("position", new THREE.BufferAttribute(this.cage, 3));
@@ -150,7 +150,7 @@ export class Viewer {
         this.draw();
       }));
     if (scene.faces.length)
-      second.append(check("point mesh", "fine", false, (on) => { for (const side of this.sides) side.fine.visible = on; this.draw(); }));
+      second.append(check("point mesh", "fine", scene.flatSpace, (on) => { for (const side of this.sides) side.fine.visible = on; this.draw(); }));
     second.append(
       check("coarse cells", "wires", true, (on) => { for (const side of this.sides) side.wires.visible = on; this.draw(); }),
       check("logarithmic scale", "logarithmic", false, (on) => { this.logarithmic = on; this.update(); }),
@@ -182,10 +182,16 @@ export class Viewer {
     }
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.sides = [new Side(this, scene), new Side(this, scene)];
-    const box = new THREE.Box3();
-    for (const list of [scene.rest.points, ...scene.frames.map((frame) => frame.points)])
+    const boxes = [scene.rest.points, ...scene.frames.map((frame) => frame.points)].map((list) => {
+      const box = new THREE.Box3();
       for (let p = 0; p < list.length; p += 3) if (Number.isFinite(list[p])) box.expandByPoint(new THREE.Vector3(list[p], list[p + 1], list[p + 2]));
-    const center = box.getCenter(new THREE.Vector3()), size = box.getSize(new THREE.Vector3()).length() || 1;
+      return box;
+    });
+    const diagonal = (box) => box.getSize(new THREE.Vector3()).length();
+    const all = boxes.reduce((a, b) => a.clone().union(b)), largest = Math.max(...boxes.map(diagonal));
+    // A body that travels farther than its size is followed.
+    this.centers = diagonal(all) > 1.6 * largest ? boxes.map((box) => box.getCenter(new THREE.Vector3())) : null;
+    const center = this.centers ? new THREE.Vector3() : all.getCenter(new THREE.Vector3()), size = (this.centers ? largest : diagonal(all)) || 1;
     this.camera = scene.flatSpace ? new THREE.OrthographicCamera() : new THREE.PerspectiveCamera(32, 1, 0.01 * size, 20 * size);
     this.extent = size;
     const away = scene.flatSpace ? new THREE.Vector3(0, 0, 1) : new THREE.Vector3(0.75, -1, 0.5).normalize();
@@ -222,6 +228,11 @@ export class Viewer {
     if (!this.renderer) return;
     const { scene, run } = this;
     this.sides.forEach((side, i) => side.pose(scene, this.chosen[i], this.time));
+    if (this.centers) {
+      const k = Math.min(Math.floor(this.time), this.centers.length - 2);
+      const center = this.centers[k].clone().lerp(this.centers[k + 1], this.time - k);
+      for (const side of this.sides) for (const part of [side.object, side.fine, side.wires]) part.position.copy(center).negate();
+    }
     // One scale for both sides and all frames: colours can be compared.
     let greatest = 0;
     for (const rule of this.chosen)
