@@ -63,6 +63,17 @@ concept Element = requires(const ReferencePoint<E>& xi) {
   { E::margin(xi) } -> std::convertible_to<double>;
 };
 
+/// An element that also states its shape functions as polynomials, which is what the fast path evaluates:
+///
+/// shape_monomials      std::array of exponents: monomial m is Π_k ξ_k^shape_monomials[m][k]; the first is 1
+/// shape_coefficients   β_i = Σ_m shape_coefficients[m][i] · monomial m
+template <class E>
+concept PolynomialElement = Element<E> && requires {
+  { E::shape_monomials.size() } -> std::convertible_to<std::size_t>;
+  { E::shape_monomials[0][E::dim - 1] } -> std::convertible_to<int>;
+  { E::shape_coefficients[0][E::num_nodes - 1] } -> std::convertible_to<int>;
+};
+
 /// Whether ξ lies in the reference cell grown by `eps` (in reference lengths).
 template <Element E>
 bool contains(const ReferencePoint<E>& xi, double eps) {

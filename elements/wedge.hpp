@@ -22,6 +22,15 @@ struct Wedge {
   static constexpr std::array<Facet, 5> facets = {
       {{3, {0, 2, 1}}, {3, {3, 4, 5}}, {4, {0, 1, 4, 3}}, {4, {1, 2, 5, 4}}, {4, {2, 0, 3, 5}}}};
 
+  static constexpr std::array<std::array<int, 3>, 6> shape_monomials = {
+      {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}}};
+  static constexpr std::array<std::array<int, 6>, 6> shape_coefficients = {{{1, 0, 0, 0, 0, 0},
+                                                                            {-1, 1, 0, 0, 0, 0},
+                                                                            {-1, 0, 1, 0, 0, 0},
+                                                                            {-1, 0, 0, 1, 0, 0},
+                                                                            {1, -1, 0, -1, 1, 0},
+                                                                            {1, 0, -1, -1, 0, 1}}};
+
   static Eigen::Matrix<double, 6, 3> nodes() {
     return (Eigen::Matrix<double, 6, 3>() << 0, 0, 0, 1, 0, 0, 0, 1, 0,  //
             0, 0, 1, 1, 0, 1, 0, 1, 1)

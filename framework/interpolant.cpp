@@ -214,13 +214,22 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
                                          const Values<Scalar>* hessians, const EvaluateOptions& options,
                                          Workspace<Scalar>& workspace, Scalar* out) const {
   const FastRule fast = fast_rule(rule);
+  const bool fast_columns = values.cols() >= 1 && values.cols() <= kernels::max_fast_columns;
   const auto is_fast = [&]<class E>(const Runs<E>&) {
-    return E::affine && options.kernel == Kernel::fast && values.cols() >= 1 &&
-           values.cols() <= kernels::max_fast_columns;
+    return kernels::has_fast_path<E>(fast.recipe) && options.kernel == Kernel::fast && fast_columns;
+  };
+  // Where a point lies outside a cell that is no simplex, its value is not the cell's polynomial.
+  const auto has_plain_runs = [&]<class E>(const Runs<E>& runs) {
+    return !is_fast(runs) || (!E::affine && !runs.extrapolates.empty());
   };
   bool any_fast = false, any_plain = false;
   for (const AnyRuns& any : blocks)
-    std::visit([&](const auto& runs) { (is_fast(runs) ? any_fast : any_plain) = true; }, any);
+    std::visit(
+        [&](const auto& runs) {
+          any_fast |= is_fast(runs);
+          any_plain |= has_plain_runs(runs);
+        },
+        any);
 
   // Gradients for the plain path, and where no stencils give the lines.
   if (rule.needs_gradients() && gradients == nullptr && (any_plain || blended)) {
@@ -263,25 +272,32 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
 
   const Values<Scalar> none;
   for_each_range([&]<class AnyElementRuns>(const AnyElementRuns& runs, Index begin, Index end) {
-    if (is_fast(runs)) {
-      const kernels::PointStage<Scalar> stage{gdim,
-                                              static_cast<int>(values.cols()),
-                                              fast.recipe,
-                                              runs.nodes.data()->data(),
-                                              runs.rest.data()->data()->data(),
-                                              runs.first.data(),
-                                              runs.local.data(),
-                                              runs.extrapolates.empty() ? nullptr : runs.extrapolates.data(),
-                                              lines,
-                                              static_cast<Scalar>(options.tolerance),
-                                              out + static_cast<Offset>(runs.base) * values.cols()};
-      stage.run(begin, end);
-    } else {
+    using E = typename AnyElementRuns::element;
+    const auto plain = [&](Index first, Index last) {
       with_columns(values.cols(), [&](auto columns) {
-        plain_point_stage<columns()>(runs, begin, end, values, gradients != nullptr ? *gradients : none,
+        plain_point_stage<columns()>(runs, first, last, values, gradients != nullptr ? *gradients : none,
                                      hessians != nullptr ? *hessians : none, options.tolerance, out);
       });
-    }
+    };
+    if (!is_fast(runs)) return plain(begin, end);
+    const kernels::PointStage<Scalar> stage{
+        .num_columns = static_cast<int>(values.cols()),
+        .recipe = fast.recipe,
+        .nodes = runs.nodes.data()->data(),
+        .rest = runs.rest.data()->data()->data(),
+        .first = runs.first.data(),
+        .first_chunk = runs.first_chunk.data(),
+        .chunks = runs.chunks.data(),
+        .local = runs.local.data(),
+        .extrapolates = runs.extrapolates.empty() ? nullptr : runs.extrapolates.data(),
+        .affine = runs.affine.data(),
+        .lines = lines,
+        .tolerance = static_cast<Scalar>(options.tolerance),
+        .out = out + static_cast<Offset>(runs.base) * values.cols()};
+    stage.template run<E>(begin, end);
+    if (!has_plain_runs(runs)) return;
+    for (Index run = begin; run < end; ++run)
+      if (runs.extrapolates[run]) plain(run, run + 1);
   });
   std::fill(out + static_cast<Offset>(num_served) * values.cols(),
             out + static_cast<Offset>(report.num_points) * values.cols(), std::numeric_limits<Scalar>::quiet_NaN());

@@ -116,6 +116,38 @@ std::vector<Index> outside_rows(const Embedding& embedding) {
   return row;
 }
 
+// Whether x(ξ) is affine on a cell, but for rounding: of its monomials only those of degree one move the cell's nodes,
+// given relative to the first (num_nodes × dim). `magnitude` is that of the coordinates, whose own rounding counts.
+template <class Scalar, PolynomialElement E>
+bool has_affine_map(const NodeMatrix<E>& nodes, double magnitude) {
+  const double extent = nodes.cwiseAbs().maxCoeff();
+  const double rounding =
+      2 * std::numeric_limits<Scalar>::epsilon() * extent + 8 * std::numeric_limits<double>::epsilon() * magnitude;
+  for (std::size_t m = 0; m < E::shape_monomials.size(); ++m) {
+    if (std::accumulate(E::shape_monomials[m].begin(), E::shape_monomials[m].end(), 0) <= 1) continue;
+    ReferencePoint<E> sum = ReferencePoint<E>::Zero();
+    for (int i = 0; i < E::num_nodes; ++i) sum += E::shape_coefficients[m][i] * nodes.row(i).transpose();
+    if (!(sum.cwiseAbs().maxCoeff() <= rounding)) return false;
+  }
+  return true;
+}
+
+// The chunks of each run.
+template <class Scalar, class Runs>
+void cut_into_chunks(Runs& runs) {
+  constexpr Index size = kernels::chunk_size<Scalar>;
+  const Index num_runs = runs.num_runs();
+  runs.first_chunk.resize(static_cast<std::size_t>(num_runs) + 1);
+  for (Index r = 0; r < num_runs; ++r)
+    runs.first_chunk[r + 1] = runs.first_chunk[r] + (runs.first[r + 1] - runs.first[r] + size - 1) / size;
+  runs.chunks.assign(static_cast<std::size_t>(runs.first_chunk.back()), static_cast<std::uint8_t>(size));
+  for (Index r = 0; r < num_runs; ++r) {
+    const Index last = runs.first_chunk[r + 1] - 1;
+    const Index count = runs.first[r + 1] - runs.first[r] - (last - runs.first_chunk[r]) * size;
+    runs.chunks[last] = static_cast<std::uint8_t>(count | kernels::last_chunk);
+  }
+}
+
 // Fills the runs of one element type from the cells `members` (places in order.cells); sizes are exact.
 template <class Runs, class Scalar>
 void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& order, std::span<const Index> members,
@@ -124,12 +156,14 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
   constexpr int n = E::num_nodes, d = E::dim;
   const auto num_runs = members.size();
   runs.nodes.resize(num_runs);
-  runs.rest.resize(num_runs);
+  runs.rest.resize(num_runs + 1);
   runs.first.resize(num_runs + 1);
   for (std::size_t r = 0; r < num_runs; ++r)
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
   const auto num_points = static_cast<std::size_t>(runs.first.back());
-  runs.local.assign(num_points * d + kernels::local_padding, Scalar(0));
+  runs.local.assign(num_points * d + kernels::vector_padding, Scalar(0));
+  cut_into_chunks<Scalar>(runs);
+  if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
   if (!outside_row.empty() && !E::affine) runs.offset.assign(num_points, -1);
   parallel_for(static_cast<std::int64_t>(num_runs), 4096, [&](std::int64_t begin, std::int64_t end) {
@@ -143,6 +177,9 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
         runs.nodes[r][i] = number[vertices[i]];
         for (int k = 0; k < d; ++k) runs.rest[r][i][k] = static_cast<Scalar>(positions(i, k) - positions(0, k));
       }
+      if constexpr (PolynomialElement<E> && !E::affine)
+        runs.affine[r] =
+            has_affine_map<Scalar, E>(positions.rowwise() - positions.row(0), positions.cwiseAbs().maxCoeff());
       const Index* points = order.points.data() + order.first_point[members[r]];
       for (Index p = runs.first[r]; p < runs.first[r + 1]; ++p, ++points) {
         permutation[p] = *points;
@@ -181,7 +218,7 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
     stencils.offsets[v + 1] = stencils.offsets[v] + table.offsets[r + 1] - table.offsets[r];
   }
   stencils.neighbors.resize(static_cast<std::size_t>(stencils.offsets.back()));
-  stencils.weights.resize(stencils.neighbors.size() * static_cast<std::size_t>(width));
+  stencils.weights.resize(stencils.neighbors.size() * static_cast<std::size_t>(width) + kernels::vector_padding);
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
     Offset to = stencils.offsets[v];
@@ -266,8 +303,9 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
   for (const auto& any : binding->blocks)
     std::visit(
         [&](const auto& runs) {
-          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.local) +
-                          bytes(runs.offset) + bytes(runs.offsets) + bytes(runs.extrapolates);
+          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.first_chunk) +
+                          bytes(runs.chunks) + bytes(runs.affine) + bytes(runs.local) + bytes(runs.offset) +
+                          bytes(runs.offsets) + bytes(runs.extrapolates);
         },
         any);
   report.bytes += bytes(binding->vertices) + bytes(binding->permutation) + bytes(binding->position) +

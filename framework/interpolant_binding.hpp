@@ -19,9 +19,12 @@ struct Interpolant<Scalar>::Binding {
 
   // The cells of one element type that hold points: one run of points a cell.
   //   nodes        [run][node]          number of the vertex
-  //   rest         [run][node][axis]    rest position relative to the run's first node
+  //   rest         [run][node][axis]    rest position relative to the run's first node; one run more than there is
   //   first        [run]                position of the run's first point in the block
-  //   local        [run][axis][point]   ξ; for simplices of a point outside too
+  //   chunks       [chunk]              number of points, and last_chunk at a run's end (kernels/cell_polynomial.hpp)
+  //   first_chunk  [run]
+  //   local        [chunk][axis][point] ξ; for simplices of a point outside too
+  //   affine       [run]                1 where x(ξ) is affine (polynomial elements but simplices)
   //   offset       [point]              row of `offsets` for points outside, else −1 (empty where no point is outside)
   //   extrapolates [run]                1 where a point is outside (empty where none is)
   template <class E>
@@ -30,7 +33,8 @@ struct Interpolant<Scalar>::Binding {
     Index base = 0;  // sorted position of the block's first point
     std::vector<std::array<Index, E::num_nodes>> nodes;
     std::vector<std::array<std::array<Scalar, E::dim>, E::num_nodes>> rest;
-    std::vector<Index> first;
+    std::vector<Index> first, first_chunk;
+    std::vector<std::uint8_t> chunks, affine;
     std::vector<Scalar> local;
     std::vector<Index> offset;
     std::vector<std::array<Scalar, E::dim>> offsets;
@@ -40,8 +44,10 @@ struct Interpolant<Scalar>::Binding {
     Index num_points() const { return first.back(); }
     // Place of ξ_k of the run's point p in `local`.
     std::size_t local_place(Index run, Index p, int k) const {
-      const Offset count = first[run + 1] - first[run];
-      return static_cast<std::size_t>(static_cast<Offset>(first[run]) * E::dim + k * count + (p - first[run]));
+      constexpr Index size = kernels::chunk_size<Scalar>;
+      const Index in_chunk = (p - first[run]) % size, chunk = p - in_chunk;
+      const Offset count = std::min(size, first[run + 1] - chunk);
+      return static_cast<std::size_t>(static_cast<Offset>(chunk) * E::dim + k * count + in_chunk);
     }
     ReferencePoint<E> xi(Index run, Index p) const {
       ReferencePoint<E> result;

@@ -1,5 +1,6 @@
-// The fast path: on a simplex every interpolant is one polynomial in the barycentric coordinates, set up a cell and a
-// frame at a time and evaluated with as many points at once as the machine's vectors have lanes.
+// The fast path: on a cell every interpolant is one polynomial in ξ, set up a cell and a frame at a time and evaluated
+// with as many points at once as the machine's vectors have lanes. On simplices ξ are barycentric coordinates and every
+// rule is served; on other elements with polynomial shape functions the linear rule and the blends are.
 //
 // Data, all in units of Scalar unless said; "four" is a vector of four that holds the 1 … 3 columns, padded with zeros:
 //
@@ -10,12 +11,17 @@
 //   stencils   [entry]             weights g_1 … g_d (q_11, q_12, …) of x_j − x_v; neighbors j
 //   nodes      [run][node]         number of the vertex; a run is the points of one cell
 //   rest       [run][node][axis]   X_i − X_0
-//   local      [run][axis][point]  β_1 … β_d of the run's points, at d · first[run]
+//   chunks     [chunk]             one byte for at most chunk_size points of a run: their number, and last_chunk where
+//                                  the run ends; the loop over chunks has no branch that depends on the data
+//   local      [chunk][axis][point]   ξ_1 … ξ_d of the chunk's points
 //
-// Coefficients of a cell come in the order in which Horner's scheme reads them, a four each: for d = 3 and degree 2
-//   | 1 | β1 | β1β1 | β1β2 | β1β3 | β2 | β2β2 | β2β3 | β3 | β3β3 |
-// They are written for a batch of cells into a buffer of the first cache level before the first of them is read: a
-// coefficient read right after its store waits for the store.
+// Coefficients of a cell are a four each, in the order that monomials.hpp gives. They are written for a batch of cells
+// into a buffer of the first cache level before the first of them is read: a coefficient read right after its store
+// waits for the store.
+//
+// Sources: vertex_stage.inl, simplex.inl (degree 1 and 2), cubic.inl, product.inl (elements that are no simplices),
+// each compiled for float and double by a file of its own and, in it, once for every instruction set; fours.inl and
+// points.inl are what they share.
 #pragma once
 
 #include <array>
@@ -33,6 +39,7 @@ enum class Recipe : std::uint8_t {
   dual_taylor  ///< x, H = ⅔F, ⅙Q
 };
 
+/// Degree of the polynomial on a simplex.
 constexpr int polynomial_degree(Recipe recipe) {
   return recipe == Recipe::linear ? 1 : recipe == Recipe::quadratic ? 2 : 3;
 }
@@ -45,8 +52,15 @@ constexpr int num_weights(Recipe recipe, int dim) {
 
 /// Greatest number of columns of values that the fast path takes at once.
 inline constexpr int max_fast_columns = 3;
-/// Elements by which arrays of local coordinates are longer than their content: vectors are read whole.
-inline constexpr int local_padding = 16;
+/// Greatest dimension of simplices on the fast path.
+inline constexpr int max_simplex_dim = 3;
+/// Numbers by which arrays that are read a whole vector at a time are longer than their content.
+inline constexpr int vector_padding = 16;
+/// Greatest number of points of a chunk: a cache line of them.
+template <class Scalar>
+inline constexpr Index chunk_size = static_cast<Index>(64 / sizeof(Scalar));
+/// Marks the last chunk of a run.
+inline constexpr std::uint8_t last_chunk = 0x80;
 
 /// Memory aligned to cache lines.
 struct alignas(64) CacheLine {
@@ -68,22 +82,48 @@ struct VertexStage {
   void run(Index begin, Index end) const;
 };
 
-/// Values at points of simplices.
+/// Values at points of cells of one element type.
 template <class Scalar>
 struct PointStage {
-  int dim, num_columns;
+  int num_columns;
   Recipe recipe;
   const Index* nodes;
   const Scalar* rest;
-  const Index* first;
+  const Index* first;        ///< [run] its first point
+  const Index* first_chunk;  ///< [run] its first chunk
+  const std::uint8_t* chunks;
   const Scalar* local;
   const std::uint8_t* extrapolates;  ///< [run] 1 where a point lies outside its cell; null where none does
+  const std::uint8_t* affine;        ///< [run] 1 where x(ξ) is affine; null for simplices, where it always is
   const Scalar* lines;
-  Scalar tolerance;  ///< > 0: runs whose quadratic part is bounded by it are linear (recipe quadratic)
+  Scalar tolerance;  ///< > 0: cells whose correction is bounded by it are linear (recipe quadratic)
   Scalar* out;       ///< [point][column], of the first point of the first run
 
-  /// Runs [begin, end) by the fastest instructions of this machine; writes their points and nothing else.
-  void run(Index begin, Index end) const;
+  /// Runs [begin, end) by the fastest instructions of this machine; writes their points and nothing else. E must be
+  /// an element for which has_fast_path holds.
+  template <Element E>
+  void run(Index begin, Index end) const {
+    if constexpr (!E::affine)
+      run_product(E::vtk_id, begin, end);
+    else if (polynomial_degree(recipe) == 3)
+      run_cubic(E::dim, begin, end);
+    else
+      run_simplex(E::dim, begin, end);
+  }
+
+ private:
+  void run_simplex(int dim, Index begin, Index end) const;
+  void run_cubic(int dim, Index begin, Index end) const;
+  void run_product(int vtk_id, Index begin, Index end) const;
 };
+
+/// Whether the fast path serves an element under a recipe.
+template <Element E>
+constexpr bool has_fast_path(Recipe recipe) {
+  if constexpr (E::affine)
+    return E::dim <= max_simplex_dim;
+  else
+    return PolynomialElement<E> && (recipe == Recipe::linear || recipe == Recipe::quadratic);
+}
 
 }  // namespace halfgrad::kernels

@@ -45,6 +45,27 @@ TYPED_TEST(ElementContract, WeightsSumToOneAndReproducePosition) {
   }
 }
 
+TYPED_TEST(ElementContract, PolynomialsAreTheShapeFunctions) {
+  if constexpr (PolynomialElement<TypeParam>) {
+    std::mt19937 random(4);
+    for (int n = 0; n < 50; ++n) {
+      const auto xi = random_inside<TypeParam>(random);
+      NodeVector<TypeParam> beta = NodeVector<TypeParam>::Zero();
+      for (std::size_t m = 0; m < TypeParam::shape_monomials.size(); ++m) {
+        double monomial = 1;
+        for (int k = 0; k < TypeParam::dim; ++k)
+          monomial *= std::pow(xi[k], TypeParam::shape_monomials[m][static_cast<std::size_t>(k)]);
+        for (int i = 0; i < TypeParam::num_nodes; ++i)
+          beta[i] += TypeParam::shape_coefficients[m][static_cast<std::size_t>(i)] * monomial;
+      }
+      EXPECT_LT((beta - TypeParam::shape(xi)).cwiseAbs().maxCoeff(), 1e-15 * 8);
+    }
+    EXPECT_EQ(TypeParam::shape_monomials[0], (std::array<int, TypeParam::dim>{}));
+  } else {
+    GTEST_SKIP() << TypeParam::name << " states no polynomials";
+  }
+}
+
 TYPED_TEST(ElementContract, GradientIsTheDerivativeOfShape) {
   std::mt19937 random(2);
   for (int n = 0; n < 50; ++n) {

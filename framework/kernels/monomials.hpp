@@ -1,0 +1,130 @@
+// Which polynomial an interpolant is on a cell, and in which order a cell's coefficients are stored.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#include "elements/element.hpp"
+
+namespace halfgrad::kernels {
+
+/// Exponents of a monomial in ξ.
+template <int d>
+using Exponents = std::array<int, d>;
+
+/// Monomials of total degree ≤ `max_degree`: what every rule is on a simplex, where β_k = ξ_k. Stored as
+///   ξ1 … ξd | 1 | ξkξl with k ≤ l | ξkξlξm with k ≤ l ≤ m
+/// but for degree 2 in three variables, which the setup with vectors of sixteen stores as it computes them:
+///   ξ1 ξ2 ξ3 1 | ξ1ξ1 ξ1ξ2 ξ1ξ3 ξ2ξ3 | (ξ1ξ1) ξ2ξ2 ξ3ξ3 (0)
+template <int max_degree, int d>
+struct SimplexMonomials {
+  static constexpr int dim = d;
+  static constexpr int num_quadratic = max_degree < 2 ? 0 : d * (d + 1) / 2;
+  static constexpr int num_cubic = max_degree < 3 ? 0 : d * (d + 1) * (d + 2) / 6;
+  /// Number of stored coefficients, in fours.
+  static constexpr int size = max_degree == 2 && d == 3 ? 12 : d + 1 + num_quadratic + num_cubic;
+
+  static constexpr int constant = d;
+  static constexpr int linear(int k) { return k; }
+  static constexpr int quadratic(int k, int l) { return table.quadratic[k][l]; }
+  static constexpr int cubic(int k, int l, int m) { return table.cubic[k][l][m]; }
+
+ private:
+  // Places in any order of the factors. Tables of constants: what they are in an unrolled loop does not depend on the
+  // optimisation level.
+  struct Table {
+    int quadratic[d][d] = {}, cubic[d][d][d] = {};
+    constexpr Table() {
+      int next = d + 1;
+      for (int k = 0; k < d; ++k)
+        for (int l = k; l < d; ++l, ++next) quadratic[k][l] = quadratic[l][k] = next;
+      for (int k = 0; k < d; ++k)
+        for (int l = k; l < d; ++l)
+          for (int m = l; m < d; ++m, ++next)
+            cubic[k][l][m] = cubic[k][m][l] = cubic[l][k][m] = cubic[l][m][k] = cubic[m][k][l] = cubic[m][l][k] = next;
+      if constexpr (max_degree == 2 && d == 3) {
+        quadratic[1][2] = quadratic[2][1] = 7;
+        quadratic[1][1] = 9;
+        quadratic[2][2] = 10;
+      }
+    }
+  };
+  static constexpr Table table{};
+
+ public:
+  /// Place of a monomial, −1 where it is not in the set.
+  static constexpr int place(const Exponents<d>& exponents) {
+    std::array<int, 3> factor{};
+    int degree = 0;
+    for (int k = 0; k < d; ++k)
+      for (int e = 0; e < exponents[static_cast<std::size_t>(k)]; ++e, ++degree) {
+        if (degree == max_degree) return -1;
+        factor[static_cast<std::size_t>(degree)] = k;
+      }
+    return degree == 0   ? constant
+           : degree == 1 ? linear(factor[0])
+           : degree == 2 ? quadratic(factor[0], factor[1])
+                         : cubic(factor[0], factor[1], factor[2]);
+  }
+};
+
+/// What the shape functions of a polynomial element are multiplied with.
+enum class Factor : std::uint8_t {
+  none,    ///< linear interpolation: Σ β_i x_i
+  affine,  ///< a blend on a cell whose x(ξ) is affine (a parallelepiped): X − X_i is affine in ξ
+  shape    ///< a blend on any cell: X − X_i is in the span of the shape functions
+};
+
+/// Monomials of the shape functions of E, multiplied as `factor` says; stored in ascending order of their exponents.
+template <PolynomialElement E, Factor factor>
+struct ProductMonomials {
+  static constexpr int dim = E::dim;
+  static constexpr int num_shape = static_cast<int>(E::shape_monomials.size());
+
+  /// Whether the shape functions are multiplied with their monomial n.
+  static constexpr bool multiplies(int n) {
+    int degree = 0;
+    for (int exponent : E::shape_monomials[static_cast<std::size_t>(n)]) degree += exponent;
+    return factor == Factor::shape || degree <= (factor == Factor::affine ? 1 : 0);
+  }
+
+ private:
+  struct List {
+    std::array<Exponents<dim>, static_cast<std::size_t>(num_shape) * num_shape> items{};
+    int size = 0;
+  };
+  static constexpr List make() {
+    List list;
+    for (const auto& m : E::shape_monomials)
+      for (int n = 0; n < num_shape; ++n) {
+        if (!multiplies(n)) continue;
+        Exponents<dim> sum{};
+        for (std::size_t k = 0; k < dim; ++k) sum[k] = m[k] + E::shape_monomials[static_cast<std::size_t>(n)][k];
+        const auto end = list.items.begin() + list.size;
+        if (std::find(list.items.begin(), end, sum) == end) list.items[static_cast<std::size_t>(list.size++)] = sum;
+      }
+    std::sort(list.items.begin(), list.items.begin() + list.size);
+    return list;
+  }
+  static constexpr List list_ = make();
+
+ public:
+  /// Number of coefficients, in fours.
+  static constexpr int size = list_.size;
+  /// Place of a monomial, −1 where it is not in the set.
+  static constexpr int place(const Exponents<dim>& exponents) {
+    for (int i = 0; i < size; ++i)
+      if (list_.items[static_cast<std::size_t>(i)] == exponents) return i;
+    return -1;
+  }
+  /// Place of the product of two monomials of the shape functions.
+  static constexpr int product(int m, int n) {
+    Exponents<dim> sum{};
+    for (std::size_t k = 0; k < dim; ++k)
+      sum[k] = E::shape_monomials[static_cast<std::size_t>(m)][k] + E::shape_monomials[static_cast<std::size_t>(n)][k];
+    return place(sum);
+  }
+};
+
+}  // namespace halfgrad::kernels

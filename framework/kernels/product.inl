@@ -1,0 +1,183 @@
+// Elements with polynomial shape functions that are no simplices, under the linear rule and the blends. A source file
+// defines HALFGRAD_SCALAR and HWY_TARGET_INCLUDE, then includes this one; Highway includes that source once a target.
+//
+// With shape functions β_i = Σ_m B_mi ξ^m the cell's map is X(ξ) − X_0 = Σ_n Y_n ξ^n, and
+//   f = Σ_i β_i (x_i + H_i (X − X_i)) = Σ_m ξ^m (w_m + Σ_n G_m Y_n ξ^n)
+// with G_m = Σ_i B_mi H_i, w_m = Σ_i B_mi (x_i − H_i (X_i − X_0)), Y_n = Σ_i B_ni (X_i − X_0). Y_n vanishes for n of
+// degree two and more where x(ξ) is affine: a hexahedron then has 20 coefficients instead of 27.
+#include <hwy/foreach_target.h>
+#include <utility>
+
+#include "elements/registry.hpp"
+#include "framework/kernels/points.inl"
+
+HWY_BEFORE_NAMESPACE();
+namespace halfgrad::kernels::HWY_NAMESPACE {
+
+// sum + Σ_i B_mi items[i · stride]
+template <class E, int m, class Item, std::size_t... i>
+HWY_INLINE Item combination(const Item* items, Item sum, std::index_sequence<i...>) {
+  const auto add = [&]<std::size_t node>() HWY_ATTR {
+    constexpr int factor = E::shape_coefficients[m][node];
+    if constexpr (factor == 1) sum = sum + items[node];
+    if constexpr (factor == -1) sum = sum - items[node];
+    static_assert(factor >= -1 && factor <= 1);
+  };
+  (add.template operator()<i>(), ...);
+  return sum;
+}
+template <class E, int m, class Item>
+HWY_INLINE Item combination(const Item* items, Item zero) {
+  return combination<E, m>(items, zero, std::make_index_sequence<E::num_nodes>());
+}
+
+// Calls f with std::integral_constant 0 … count − 1.
+template <int count, class Function>
+HWY_INLINE void unrolled(Function&& f) {
+  [&]<int... i>(std::integer_sequence<int, i...>) HWY_ATTR { (f(std::integral_constant<int, i>()), ...); }
+  (std::make_integer_sequence<int, count>());
+}
+
+// Linear interpolation; other coefficients than its own stay as they are.
+template <class E, Factor factor, class T>
+HWY_INLINE void set_up_shape(const T* const* line, T* coefficients) {
+  using F = Four<T>;
+  using M = ProductMonomials<E, factor>;
+  F x[E::num_nodes];
+  HALFGRAD_UNROLL
+  for (int i = 0; i < E::num_nodes; ++i) x[i] = F::load(line[i]);
+  unrolled<M::num_shape>(
+      [&](auto m) HWY_ATTR { combination<E, m()>(x, F::zero()).store(coefficients + 4 * M::product(m(), 0)); });
+}
+
+template <class E, Factor factor, class T>
+HWY_INLINE void set_up_blend(const T* const* line, const T* rest, T* coefficients) {
+  using F = Four<T>;
+  using M = ProductMonomials<E, factor>;
+  constexpr int n = E::num_nodes, d = E::dim;
+  F moved[n], h[d][n], sum[M::size];
+  HALFGRAD_UNROLL
+  for (int i = 0; i < n; ++i) {
+    moved[i] = F::load(line[i]);
+    HALFGRAD_UNROLL
+    for (int a = 0; a < d; ++a) {
+      h[a][i] = F::load(line[i] + 4 * (1 + a));
+      moved[i] = moved[i].minus(h[a][i], rest[i * d + a]);
+    }
+  }
+  T y[M::num_shape][d];
+  for (int a = 0; a < d; ++a) {
+    T along[n];
+    for (int i = 0; i < n; ++i) along[i] = rest[i * d + a];
+    unrolled<M::num_shape>([&](auto m) HWY_ATTR { y[m()][a] = combination<E, m()>(along, T(0)); });
+  }
+  HALFGRAD_UNROLL
+  for (int i = 0; i < M::size; ++i) sum[i] = F::zero();
+  unrolled<M::num_shape>([&](auto m) HWY_ATTR {
+    F& own = sum[M::product(m(), 0)];
+    own = combination<E, m()>(moved, own);
+    F g[d];
+    HALFGRAD_UNROLL
+    for (int a = 0; a < d; ++a) g[a] = combination<E, m()>(h[a], F::zero());
+    unrolled<M::num_shape>([&](auto other) HWY_ATTR {
+      constexpr int place = M::product(m(), other());
+      // Y of the monomial 1 is zero.
+      if constexpr (other() > 0 && M::multiplies(other())) {
+        HALFGRAD_UNROLL
+        for (int a = 0; a < d; ++a) sum[place] = sum[place].plus(g[a], y[other()][a]);
+      }
+    });
+  });
+  HALFGRAD_UNROLL
+  for (int i = 0; i < M::size; ++i) sum[i].store(coefficients + 4 * i);
+}
+
+// ---- runs
+
+template <class E, int computed, class T>
+void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
+  using Monomials = ProductMonomials<E, Factor::none>;
+  constexpr int stride = 4 * Monomials::size;
+  HWY_ALIGN T coefficients[batch_size * stride];
+  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * stage.num_columns;
+  for (Index batch = begin; batch < end; batch += batch_size) {
+    const Index batch_end = std::min(batch + batch_size, end);
+    T* target = coefficients;
+    for (Index run = batch; run < batch_end; ++run, target += stride) {
+      const T* line[E::num_nodes];
+      find_lines<E::num_nodes, 4>(stage, run, line);
+      set_up_shape<E, Factor::none>(line, target);
+    }
+    evaluate_chunks<Monomials, computed>(stage, batch, batch_end, coefficients, stride, stage.num_columns, limit);
+  }
+}
+
+template <class E, Factor factor, int computed, class T>
+HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, Index begin, Index end, const T* limit) {
+  using Monomials = ProductMonomials<E, factor>;
+  constexpr int stride = 4 * Monomials::size;
+  HWY_ALIGN T coefficients[batch_size * stride];
+  T* target = coefficients;
+  for (Index run = begin; run < end; ++run, target += stride) {
+    const T* line[E::num_nodes];
+    find_lines<E::num_nodes, 4 * (1 + E::dim)>(stage, run, line);
+    if (HWY_UNLIKELY(stage.tolerance > 0) && is_within_tolerance<E::num_nodes, E::dim>(stage, run, line)) {
+      std::fill(target, target + stride, T(0));
+      set_up_shape<E, factor>(line, target);
+    } else {
+      set_up_blend<E, factor>(line, stage.rest + static_cast<Offset>(run) * E::num_nodes * E::dim, target);
+    }
+  }
+  evaluate_chunks<Monomials, computed>(stage, begin, end, coefficients, stride, stage.num_columns, limit);
+}
+
+template <class E, int computed, class T>
+void evaluate_blend(const PointStage<T>& stage, Index begin, Index end) {
+  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * stage.num_columns;
+  for (Index batch = begin; batch < end; batch += batch_size) {
+    const Index batch_end = std::min(batch + batch_size, end);
+    const bool affine = std::all_of(stage.affine + batch, stage.affine + batch_end, [](auto a) { return a != 0; });
+    if (affine)
+      evaluate_blend_batch<E, Factor::affine, computed>(stage, batch, batch_end, limit);
+    else
+      evaluate_blend_batch<E, Factor::shape, computed>(stage, batch, batch_end, limit);
+  }
+}
+
+// Fewer columns than `computed` are stored, not computed: dim columns or three serve all.
+template <class E, int computed, class T>
+void with_recipe(const PointStage<T>& stage, Index begin, Index end) {
+  if (stage.recipe == Recipe::linear)
+    evaluate_linear<E, computed>(stage, begin, end);
+  else
+    evaluate_blend<E, computed>(stage, begin, end);
+}
+
+void product_points(const PointStage<HALFGRAD_SCALAR>& stage, int vtk_id, Index begin, Index end) {
+  Elements::for_each([&]<class E>() {
+    if constexpr (PolynomialElement<E> && !E::affine) {
+      if (E::vtk_id != vtk_id) return;
+      if (E::dim < max_fast_columns && stage.num_columns <= E::dim)
+        with_recipe<E, std::min<int>(E::dim, max_fast_columns)>(stage, begin, end);
+      else
+        with_recipe<E, max_fast_columns>(stage, begin, end);
+    }
+  });
+}
+
+}  // namespace halfgrad::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace halfgrad::kernels {
+namespace {  // the table of targets
+HWY_EXPORT(product_points);
+}  // namespace
+
+template <>
+void PointStage<HALFGRAD_SCALAR>::run_product(int vtk_id, Index begin, Index end) const {
+  HWY_DYNAMIC_DISPATCH(product_points)(*this, vtk_id, begin, end);
+}
+
+}  // namespace halfgrad::kernels
+#endif
