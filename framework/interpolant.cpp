@@ -218,7 +218,7 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
     return E::affine && options.kernel == Kernel::fast && values.cols() >= 1 &&
            values.cols() <= kernels::max_fast_columns;
   };
-  bool any_fast = false, any_plain = false;
+  bool any_fast = false, any_plain = weighted.num_points() > 0;
   for (const AnyRuns& any : blocks)
     std::visit([&](const auto& runs) { (is_fast(runs) ? any_fast : any_plain) = true; }, any);
 
@@ -283,6 +283,8 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
       });
     }
   });
+  if (weighted.num_points() > 0)
+    weighted_point_stage(values, gradients != nullptr ? *gradients : none, hessians != nullptr ? *hessians : none, out);
   std::fill(out + static_cast<Offset>(num_served) * values.cols(),
             out + static_cast<Offset>(report.num_points) * values.cols(), std::numeric_limits<Scalar>::quiet_NaN());
 }

@@ -30,7 +30,13 @@ add_test(NAME install_consumer
          COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/install_consumer/run.sh ${PROJECT_BINARY_DIR}
                  ${PROJECT_SOURCE_DIR}/README.md)
 
-set_tests_properties(headers_compile_alone missing_element_member_is_named install_consumer PROPERTIES LABELS build)
+# The projects below examples/ add an element and a reconstructor to an installed halfgrad, and hold them to its
+# contracts.
+add_test(NAME examples
+         COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/examples.sh ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR}/examples)
+
+set_tests_properties(headers_compile_alone missing_element_member_is_named install_consumer examples
+                     PROPERTIES LABELS build)
 
 # The report in a browser, where there is one.
 if(TARGET halfgrad_program AND HALFGRAD_NODE)
