@@ -40,7 +40,9 @@ TEST(MixedLattice, FillsTheBoxWithEveryElementAndConforms) {
         const auto X = mesh->vertices().row(v);
         EXPECT_EQ(boundary[v] != 0, X.minCoeff() == 0 || X.maxCoeff() == 1);
       }
-      if (jitter == 0) EXPECT_NEAR(report.volume, 1, 1e-12);
+      if (jitter == 0) {
+        EXPECT_NEAR(report.volume, 1, 1e-12);
+      }
     }
   }
 }

@@ -59,10 +59,12 @@ TEST(CellBlocks, GiveWhatAMeshGives) {
       const Reconstruction b = reconstructor->reconstruct(there, active_vertices(mesh, embedding));
       const Interpolant<double> own(weights, named_rule(rule), &a), known(mesh, embedding, named_rule(rule), &b);
       EXPECT_LT((own.evaluate(values) - known.evaluate(values)).cwiseAbs().maxCoeff(), 1e-13) << name << rule;
-      if (rule != std::string("linear"))
+      if (rule != std::string("linear")) {
         EXPECT_LT((own.smooth_gradient(values) - known.smooth_gradient(values)).cwiseAbs().maxCoeff(), 1e-12);
-      if (name == std::string("kriging"))
+      }
+      if (name == std::string("kriging")) {
         EXPECT_LT((own.matrix() * values - own.evaluate(values)).cwiseAbs().maxCoeff(), 1e-13);
+      }
     }
 }
 
