@@ -9,8 +9,10 @@
 #include "framework/fingerprint.hpp"
 #include "framework/interpolant.hpp"
 #include "framework/io/binding_file.hpp"
+#include "framework/io/formats.hpp"
 #include "framework/io/mesh_file.hpp"
 #include "reconstruction/registry.hpp"
+#include "reconstruction/surface_gradients.hpp"
 
 namespace halfgrad::app {
 
@@ -18,8 +20,13 @@ using nlohmann::json;
 
 namespace {
 
-json parse_reconstructor(const std::string& text, const InterpolationRule& rule, std::string_view preferred) {
-  if (text.empty()) return rule.needs_hessians() ? json{{"kriging", {{"drift", "cubic"}}}} : json(preferred);
+// Where the user names none: what the command prefers, on grids the rule that lists no cells, and the one that gives
+// Hessians where they are needed.
+json parse_reconstructor(const std::string& text, const InterpolationRule& rule, const std::filesystem::path& rest,
+                         std::string_view preferred) {
+  if (text.empty() && rule.needs_hessians()) return {{"kriging", {{"drift", "cubic"}}}};
+  if (text.empty())
+    return find_format(rest, FormatUse::read_mesh).read_grid != nullptr ? "centered_difference" : json(preferred);
   if ((text[0] != '{' && text[0] != '"')) return text;
   try {
     return json::parse(text);
@@ -84,7 +91,8 @@ BindSettings parse_settings(const BindOptions& options, std::string_view preferr
     if (options.interpolant) require_same(*options.interpolant, settings.interpolant, "--interpolant", options.binding);
     if (options.outside) require_same(*options.outside, settings.outside, "--outside", options.binding);
     if (!specification.empty()) {
-      const json wanted = parse_reconstructor(specification, named_rule(settings.interpolant), preferred);
+      const json wanted =
+          parse_reconstructor(specification, named_rule(settings.interpolant), settings.rest, preferred);
       require_same(wanted.dump(), read("reconstructor"), "--reconstructor", options.binding);
     }
     specification = read("reconstructor");
@@ -97,7 +105,7 @@ BindSettings parse_settings(const BindOptions& options, std::string_view preferr
   }
   settings.rule = parse_rule(settings.interpolant, alpha);
   parse_outside(settings.outside);
-  const json parsed = parse_reconstructor(specification, settings.rule, preferred);
+  const json parsed = parse_reconstructor(specification, settings.rule, settings.rest, preferred);
   const MadeReconstructor made = make_reconstructor(parsed, "--reconstructor");
   settings.specification = parsed.dump();
   settings.reconstructor = made.name;
@@ -118,20 +126,40 @@ std::string BindSettings::to_json() const {
 
 Binding read_inputs(const BindSettings& settings) {
   Binding binding;
-  binding.mesh = read_mesh(settings.rest);
-  binding.quality = inspect(binding.mesh);
+  RestShape rest = read_rest_shape(settings.rest);
+  if (Grid* grid = std::get_if<Grid>(&rest)) {
+    binding.grid = std::move(*grid);
+  } else {
+    binding.mesh = std::get<Mesh>(std::move(rest));
+    binding.quality = inspect(binding.mesh);
+  }
   if (const std::vector<Index>& flat = binding.quality.degenerate_cells; !flat.empty())
     raise("{}: {} of {} cells have no volume, the first is cell {} ({})", settings.rest.string(), flat.size(),
           binding.mesh.num_cells(), flat[0], element_name(binding.mesh, flat[0]));
+  if ((binding.grid || binding.on_surface()) && !settings.binding.empty())
+    raise("{}: saved bindings are those of meshes that fill their space; grids and surfaces are bound anew",
+          settings.rest.string());
   binding.surface = read_points(settings.points);
-  binding.points = in_dimension(binding.surface.points, binding.mesh.gdim(), settings.points.string());
-  binding.fingerprint = Fingerprint().add(binding.mesh).add(binding.points).text();
+  binding.points = in_dimension(binding.surface.points, binding.gdim(), settings.points.string());
+  Fingerprint print;
+  if (binding.grid) {
+    for (Index v = 0; v < binding.grid->num_vertices(); ++v) print.add(Points(binding.grid->position(v).transpose()));
+  } else {
+    print.add(binding.mesh);
+  }
+  binding.fingerprint = print.add(binding.points).text();
   return binding;
 }
 
 void locate(const BindSettings& settings, Binding& binding) {
+  if (binding.on_surface()) {
+    binding.feet = embed_on_surface(binding.mesh, binding.points);
+    return;
+  }
   if (settings.binding.empty()) {
-    binding.embedding = embed(binding.mesh, binding.points, {.outside = parse_outside(settings.outside)});
+    const EmbedOptions options{.outside = parse_outside(settings.outside)};
+    binding.embedding =
+        binding.grid ? embed(*binding.grid, binding.points, options) : embed(binding.mesh, binding.points, options);
     return;
   }
   SavedBinding saved =
@@ -142,15 +170,25 @@ void locate(const BindSettings& settings, Binding& binding) {
 
 void reconstruct(const BindSettings& settings, Binding& binding) {
   if (binding.reconstruction) return;
-  binding.reconstruction =
-      make_reconstructor(json::parse(settings.specification), "--reconstructor")
-          .reconstructor->reconstruct(CellGradients(binding.mesh), active_vertices(binding.mesh, binding.embedding));
+  const MadeReconstructor made = make_reconstructor(json::parse(settings.specification), "--reconstructor");
+  const VertexGradientReconstructor& reconstructor = *made.reconstructor;
+  if (binding.grid)
+    binding.reconstruction =
+        reconstructor.reconstruct_on_grid(*binding.grid, active_vertices(*binding.grid, binding.embedding));
+  else if (binding.on_surface())
+    binding.reconstruction = surface_gradients(reconstructor, binding.mesh, active_vertices(binding.feet.feet));
+  else
+    binding.reconstruction =
+        reconstructor.reconstruct(CellGradients(binding.mesh), active_vertices(binding.mesh, binding.embedding));
 }
 
 void save_binding(const BindOptions& options, const std::filesystem::path& out, bool quiet) {
   if (out.extension() != ".hgb") raise("--out {}: expected a name that ends in .hgb", out.string());
   const BindSettings settings = parse_settings(options);
   Binding binding = read_inputs(settings);
+  if (binding.grid || binding.on_surface())
+    raise("{}: bindings are saved for meshes that fill their space; deform binds grids and surfaces itself",
+          settings.rest.string());
   locate(settings, binding);
   if (settings.rule.needs_gradients()) reconstruct(settings, binding);
   write_binding(out, {settings.to_json(), binding.fingerprint, binding.embedding, binding.reconstruction});

@@ -7,8 +7,10 @@
 
 #include "framework/embedding.hpp"
 #include "framework/gradient_stencils.hpp"
+#include "framework/grid.hpp"
 #include "framework/interpolation_rule.hpp"
 #include "framework/io/point_set.hpp"
+#include "framework/surface.hpp"
 
 namespace halfgrad::app {
 
@@ -18,7 +20,9 @@ struct BindOptions {
   std::filesystem::path binding;  ///< a saved binding; it fills in what the others leave open
   std::optional<std::string> interpolant;
   std::optional<double> alpha;
-  std::string reconstructor;  ///< a name or JSON; empty: what the command prefers
+  /// A name or JSON; empty: what the command prefers, on grids centered_difference, for dual_taylor kriging with cubic
+  /// drift.
+  std::string reconstructor;
   std::optional<std::string> outside;
 };
 
@@ -39,16 +43,22 @@ BindSettings parse_settings(const BindOptions& options, std::string_view preferr
 
 /// What binding took and gave.
 struct Binding {
-  Mesh mesh;
-  MeshReport quality;
+  std::optional<Grid> grid;  ///< instead of a mesh
+  Mesh mesh;                 ///< a surface in space too
+  MeshReport quality;        ///< of a mesh
   PointSet surface;
   Points points;  ///< of the surface, in the mesh's dimension
   std::string fingerprint;
   Embedding embedding;
+  SurfaceEmbedding feet;  ///< instead of an embedding, of points near a surface
   std::optional<Reconstruction> reconstruction;
+
+  bool on_surface() const { return mesh.is_surface(); }
+  int gdim() const { return grid ? grid->gdim() : mesh.gdim(); }
+  Index num_vertices() const { return grid ? grid->num_vertices() : mesh.num_vertices(); }
 };
 
-/// Reads the rest mesh and the points. Throws Error on degenerate cells.
+/// Reads the rest shape and the points. Throws Error on degenerate cells.
 Binding read_inputs(const BindSettings& settings);
 /// Locates the points, or takes them from the saved binding.
 void locate(const BindSettings& settings, Binding& binding);

@@ -79,7 +79,7 @@ Channels::Channels(const DeformOptions& options, const Binding& binding, const F
   if (options.normals) {
     if (*options.normals != "gradient" && *options.normals != "smooth")
       raise("--normals {}: expected gradient or smooth", *options.normals);
-    if (binding.mesh.gdim() != 3 || frames.num_columns() != 3)
+    if (binding.gdim() != 3 || frames.num_columns() != 3)
       raise("--normals: needs a mesh and frames in three dimensions");
     if (binding.surface.faces.num_rows() == 0) raise("--normals: the points have no faces");
     normals_ = surface_normals(binding.surface);
@@ -116,13 +116,12 @@ void Channels::resume(Index num_frames) {
 }
 
 template <class Scalar>
-std::vector<PointArray> Channels::carry(const Interpolant<Scalar>& interpolant, const Values<Scalar>& positions,
-                                        Index frame) {
+std::vector<PointArray> Channels::carry(const Carrier<Scalar>& carrier, const Values<Scalar>& positions, Index frame) {
   using Kind = Channel::Kind;
   std::vector<PointArray> arrays = constant_;
   Values<Scalar> gradients, smooth;
   const auto exact = [&]() -> const Values<Scalar>& {
-    if (gradients.size() == 0) gradients = interpolant.gradient(positions);
+    if (gradients.size() == 0) gradients = carrier.gradient(positions);
     return gradients;
   };
   for (const auto& channel : channels_) {
@@ -132,19 +131,19 @@ std::vector<PointArray> Channels::carry(const Interpolant<Scalar>& interpolant, 
         result = exact();
         break;
       case Kind::stretch:
-        result = principal_stretches(exact().template cast<double>(), interpolant.gdim()).template cast<Scalar>();
+        result = principal_stretches(exact().template cast<double>(), carrier.gdim).template cast<Scalar>();
         break;
       case Kind::normals:
         result = carried_normals(exact().template cast<double>(), normals_).template cast<Scalar>();
         break;
       case Kind::smooth_normals:
-        smooth = interpolant.smooth_gradient(positions);
+        smooth = carrier.smooth_gradient(positions);
         result = carried_normals(smooth.template cast<double>(), normals_).template cast<Scalar>();
         break;
       case Kind::field: {
         Values<double> values;
         channel->field->read(frame, values);
-        result = interpolant.evaluate(values.template cast<Scalar>());
+        result = carrier.evaluate_field(values.template cast<Scalar>());
         break;
       }
     }
@@ -156,8 +155,8 @@ std::vector<PointArray> Channels::carry(const Interpolant<Scalar>& interpolant, 
   return arrays;
 }
 
-template std::vector<PointArray> Channels::carry(const Interpolant<float>&, const Values<float>&, Index);
-template std::vector<PointArray> Channels::carry(const Interpolant<double>&, const Values<double>&, Index);
+template std::vector<PointArray> Channels::carry(const Carrier<float>&, const Values<float>&, Index);
+template std::vector<PointArray> Channels::carry(const Carrier<double>&, const Values<double>&, Index);
 
 void Channels::finish() {
   for (const auto& channel : channels_)

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "apps/deform.hpp"
-#include "framework/interpolant.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
 
@@ -26,7 +25,7 @@ class Channels {
   /// Computes the arrays of a frame from its vertex positions; writes those that have their own sequence and returns
   /// the others.
   template <class Scalar>
-  std::vector<PointArray> carry(const Interpolant<Scalar>& interpolant, const Values<Scalar>& positions, Index frame);
+  std::vector<PointArray> carry(const Carrier<Scalar>& carrier, const Values<Scalar>& positions, Index frame);
   void finish();
 
  private:

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -10,7 +11,6 @@
 #include "apps/channels.hpp"
 #include "framework/error.hpp"
 #include "framework/fingerprint.hpp"
-#include "framework/interpolant.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
 #include "framework/io/output_file.hpp"
@@ -72,6 +72,13 @@ json vertex_rules(const GradientStencilTable& table) {
   return counts;
 }
 
+// Signed: behind the surface's normals is negative.
+json distance_range(const std::vector<double>& distance) {
+  if (distance.empty()) return {{"least", 0.0}, {"greatest", 0.0}};
+  const auto [least, greatest] = std::minmax_element(distance.begin(), distance.end());
+  return {{"least", *least}, {"greatest", *greatest}};
+}
+
 // The frames asked for.
 struct FrameRange {
   std::int64_t first, last, step;
@@ -117,8 +124,7 @@ struct Tally {
 template <class Scalar>
 Tally run_frames(const DeformOptions& options, const BindSettings& settings, const Binding& binding,
                  FrameSource& source, const FrameRange& range, Stopwatch& watch) {
-  const Interpolant<Scalar> interpolant(binding.mesh, binding.embedding, settings.rule,
-                                        binding.reconstruction ? &*binding.reconstruction : nullptr);
+  const Carrier<Scalar> carrier = make_carrier<Scalar>(binding, settings.rule);
   watch.lap("bind");
 
   const FrameSinkOptions sink_options{range.first, range.step, run_name(options, settings, binding, range),
@@ -127,7 +133,7 @@ Tally run_frames(const DeformOptions& options, const BindSettings& settings, con
   Channels channels(options, binding, source, sink_options);
 
   Tally tally;
-  tally.report = interpolant.report();
+  tally.report = carrier.report;
   // The last frame is written anew, and with it what the files say of all frames.
   if (options.resume) {
     const Index kept = num_unchanged(
@@ -138,7 +144,6 @@ Tally run_frames(const DeformOptions& options, const BindSettings& settings, con
     tally.resumed = kept;
   }
   Values<Scalar> values, out;
-  Workspace<Scalar> workspace;
   Progress progress(options.quiet ? ProgressMode::never : options.progress, "deform", range.count(), "frames");
   const SignalWatch signals;
   try {
@@ -146,11 +151,11 @@ Tally run_frames(const DeformOptions& options, const BindSettings& settings, con
       watch.start();
       source.read(range.frame(i), values);
       watch.lap("read_frames");
-      interpolant.evaluate(values, out, workspace, {.tolerance = options.tolerance});
+      carrier.evaluate(values, out, {.tolerance = options.tolerance});
       watch.lap("evaluate");
       if (options.tolerance > 0 && !options.report.empty())
-        tally.linear_cells += interpolant.num_linear_cells(values, {.tolerance = options.tolerance});
-      const std::vector<PointArray> arrays = channels.carry(interpolant, values, range.frame(i));
+        tally.linear_cells += carrier.num_linear_cells(values, {.tolerance = options.tolerance});
+      const std::vector<PointArray> arrays = channels.carry(carrier, values, range.frame(i));
       watch.lap("arrays");
       sink->write(out, arrays);
       watch.lap("write");
@@ -209,6 +214,7 @@ json report_of(const DeformOptions& options, const BindSettings& settings, const
                     {"unused_vertices", quality.unused_vertices.size()},
                     {"min_quality", quality.min_quality}};
   if (binding.reconstruction) report["vertex_rules"] = vertex_rules(binding.reconstruction->stencils);
+  if (binding.on_surface()) report["distance"] = distance_range(binding.feet.distance);
   double farthest = 0;
   json outside_points = json::array();
   for (const OutsidePoint& outside : binding.embedding.outside) {
@@ -230,6 +236,11 @@ void print_summary(const DeformOptions& options, const BindSettings& settings, c
   fmt::print("{}{}; {} of {} cells and {} of {} vertices used\n", settings.interpolant,
              settings.rule.needs_gradients() ? " with " + settings.reconstructor : "", bound.num_active_cells,
              bound.num_cells, bound.num_active_vertices, bound.num_vertices);
+  if (binding.on_surface()) {
+    const json range = distance_range(binding.feet.distance);
+    fmt::print("points lie {:.4g} to {:.4g} length units from the surface\n", range["least"].get<double>(),
+               range["greatest"].get<double>());
+  }
   if (!binding.embedding.outside.empty())
     fmt::print("{} points outside the mesh, {} length units away at most ({})\n", binding.embedding.outside.size(),
                bound.max_outside_distance,
@@ -259,14 +270,19 @@ void deform(const DeformOptions& given) {
 
   Binding binding = read_inputs(settings);
   const std::unique_ptr<FrameSource> source = open_frames(options.frames);
-  if (source->num_vertices() != binding.mesh.num_vertices())
+  if (source->num_vertices() != binding.num_vertices())
     raise("{}: frames of {} vertices, but {} has {}", options.frames, source->num_vertices(), settings.rest.string(),
-          binding.mesh.num_vertices());
+          binding.num_vertices());
+  if (binding.on_surface() && source->num_columns() != 3)
+    raise("{}: frames of {} coordinates, but {} is a surface in space", options.frames, source->num_columns(),
+          settings.rest.string());
   const FrameRange range = frame_range(options, *source);
   watch.lap("read");
   locate(settings, binding);
   watch.lap("locate");
-  if (settings.rule.needs_gradients() || options.gradients || options.stretch || options.normals)
+  // Offsets from a surface follow its normals, whatever the rule.
+  if (settings.rule.needs_gradients() || options.gradients || options.stretch || options.normals ||
+      binding.on_surface())
     reconstruct(settings, binding);
   watch.lap("reconstruct");
 

@@ -228,6 +228,9 @@ void export_map(const ExportOptions& options) {
     raise("--precision {}: expected float or double", options.precision);
 
   Binding bound = read_inputs(settings);
+  if (bound.grid || bound.on_surface())
+    raise("{}: found a {}, maps are exported for meshes that fill their space", settings.rest.string(),
+          bound.grid ? "grid" : "surface");
   const std::unique_ptr<FrameSource> source =
       options.frames.empty() ? nullptr : open_checked_frames(options, settings.rest, bound.mesh);
   locate(settings, bound);

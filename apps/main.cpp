@@ -162,7 +162,8 @@ int dispatch(int argc, char** argv) {
   check_app->footer("Example: halfgrad check configs/quickstart.json");
 
   const auto add_bind_options = [](CLI::App* app, BindOptions& bind, const std::string& preferred) {
-    app->add_option("--rest", bind.rest, "Rest mesh: .msh .vtk .vtu .mesh .node/.ele");
+    app->add_option("--rest", bind.rest,
+                    "Rest mesh, grid or surface: .msh .vtk .vtu .mesh .node/.ele .vti .vtr .obj .ply");
     app->add_option("--points", bind.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy");
     app->add_option("--interpolant", bind.interpolant,
                     "A name, or JSON with options; see halfgrad list interpolants (default: phong)");

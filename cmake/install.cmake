@@ -11,12 +11,20 @@ install(DIRECTORY elements framework reconstruction DESTINATION ${header_directo
         FILES_MATCHING PATTERN "*.hpp"
         PATTERN "framework/io" EXCLUDE
         PATTERN "framework/kernels/formulas.hpp" EXCLUDE
-        REGEX "framework/(boundary_facets|cell_extent|cell_locator|nearest_cell|plane_margins)[.]hpp$" EXCLUDE
-        REGEX "framework/(interpolant_binding|inverse_map)[.]hpp$" EXCLUDE
+        PATTERN "framework/kernels/targets.hpp" EXCLUDE
+        REGEX "framework/(boundary_facets|cell_locator|nearest_cell|plane_margins|interpolant_binding)[.]hpp$" EXCLUDE
         REGEX "reconstruction/(kriging_system|symmetric_eigen)[.]hpp$" EXCLUDE)
 foreach(header frame_sink frame_source geometry mesh_file npy point_set vtk_output)
   install(FILES framework/io/${header}.hpp DESTINATION ${header_directory}/framework/io COMPONENT development)
 endforeach()
+# The contracts of elements and reconstructors as test suites, for those of other projects.
+install(DIRECTORY tests/contracts tests/support DESTINATION ${header_directory}/tests COMPONENT development
+        FILES_MATCHING PATTERN "*.hpp" PATTERN "shared_data.hpp" EXCLUDE)
+if(TARGET halfgrad_experiments)
+  set_target_properties(halfgrad_experiments PROPERTIES EXPORT_NAME experiments)
+  install(TARGETS halfgrad_experiments EXPORT halfgradTargets COMPONENT development)
+  install(DIRECTORY experiments DESTINATION ${header_directory} COMPONENT development FILES_MATCHING PATTERN "*.hpp")
+endif()
 install(EXPORT halfgradTargets NAMESPACE halfgrad:: DESTINATION ${package_directory} COMPONENT development)
 configure_package_config_file(cmake/halfgradConfig.cmake.in ${PROJECT_BINARY_DIR}/halfgradConfig.cmake
                               INSTALL_DESTINATION ${package_directory})

@@ -196,7 +196,8 @@ class LevelRun {
       : config_(config),
         level_(level),
         progress_(std::move(progress)),
-        mesh_(config.mesh.make(level)),
+        grid_(config.mesh.make_grid ? std::optional(config.mesh.make_grid(level)) : std::nullopt),
+        mesh_(grid_ ? grid_->mesh() : config.mesh.make(level)),
         cloud_(config.points(mesh_, config.mesh.is_zoom ? 0 : level)) {}
 
   LevelRun(const ExperimentConfig& config, const Mesh& whole, HeldOutMesh held_out,
@@ -257,11 +258,13 @@ class LevelRun {
     facts.cells = mesh_.num_cells();
     facts.h = mean_edge_length(mesh_);
     facts.points = static_cast<Index>(cloud_.positions.rows());
-    facts.locate_seconds = median_seconds(
-        config_.repetitions, [&] { embedding = embed(mesh_, cloud_.positions, {.outside = config_.outside}); });
+    facts.locate_seconds = median_seconds(config_.repetitions, [&] {
+      const EmbedOptions options{.outside = config_.outside};
+      embedding = grid_ ? embed(*grid_, cloud_.positions, options) : embed(mesh_, cloud_.positions, options);
+    });
     facts.outside_points = static_cast<Index>(embedding.outside.size());
     place_points(embedding);
-    const std::vector<Index> active = active_vertices(mesh_, embedding);
+    const std::vector<Index> active = grid_ ? active_vertices(*grid_, embedding) : active_vertices(mesh_, embedding);
 
     for (const ConfiguredInterpolant& named : config_.interpolants)
       if (!named.needs_gradients()) add_rule(embedding, named, facts, nullptr, nullptr);
@@ -275,8 +278,8 @@ class LevelRun {
       Reconstruction reconstruction;
       if (made.reconstructor) {
         own.reconstruct_seconds = median_seconds(config_.repetitions, [&] {
-          const CellGradients cells(mesh_);
-          reconstruction = made.reconstructor->reconstruct(cells, active);
+          reconstruction = grid_ ? made.reconstructor->reconstruct_on_grid(*grid_, active)
+                                 : made.reconstructor->reconstruct(CellGradients(mesh_), active);
         });
         own.sigma = weight_deviation(*made.reconstructor, CellGradients(mesh_), active);
         if (picture != nullptr) picture->stencils.emplace_back(made.name, reconstruction.stencils);
@@ -299,8 +302,12 @@ class LevelRun {
       return;
     }
     const bool is_exact = made != nullptr && !made->reconstructor;
+    const Reconstruction* given = is_exact ? nullptr : reconstruction;
     BoundRule rule;
-    rule.interpolant.emplace(mesh_, embedding, named.rule, is_exact ? nullptr : reconstruction);
+    if (grid_)
+      rule.interpolant.emplace(*grid_, embedding, named.rule, given);
+    else
+      rule.interpolant.emplace(mesh_, embedding, named.rule, given);
     rule.is_exact = is_exact;
     rule.facts = std::move(facts);
     rule.facts.interpolant = named.name;
@@ -375,6 +382,7 @@ class LevelRun {
   int level_;
   std::function<void(std::string_view, double)> progress_;
   std::optional<HeldOutMesh> held_out_;
+  std::optional<Grid> grid_;  // binds where there is one; its explicit mesh only places points and measures
   Mesh mesh_;
   PointCloud cloud_;
   std::vector<PointPlace> places_;
@@ -385,7 +393,8 @@ bool wants(const ExperimentConfig& config, OutputKind kind) {
   return std::find(config.outputs.begin(), config.outputs.end(), kind) != config.outputs.end();
 }
 
-/// report.html, and scene.json where there is a level to show, so that `halfgrad report` can show the run beside others.
+/// report.html, and scene.json where there is a level to show, so that `halfgrad report` can show the run beside
+/// others.
 void write_html(const std::filesystem::path& directory, ExperimentResult& result) {
   std::string page;
   if (report_script().empty()) {
@@ -425,7 +434,8 @@ std::vector<ResultRow> run_folds(const ExperimentConfig& config, const RunOption
 }  // namespace
 
 ExperimentResult run_experiment(const std::filesystem::path& path, const RunOptions& options) {
-  const ExperimentConfig config = read_experiment_config(path, options.overrides, options.reduced);
+  const ExperimentConfig config =
+      read_experiment_config(path, options.overrides, options.reduced, options.reconstructors);
   ExperimentResult result;
   result.name = config.name;
   result.config = config.resolved;

@@ -44,10 +44,11 @@ std::vector<json> read_list(JsonReader& reader, std::string_view key, json fallb
 }
 
 /// The registry's reconstructors, and `exact`, which takes the field itself.
-MadeReconstructor read_reconstructor(const json& specification, const std::string& pointer, bool has_field) {
+MadeReconstructor read_reconstructor(const json& specification, const std::string& pointer, bool has_field,
+                                     std::span<const ReconstructorEntry> further) {
   const bool is_exact = specification == "exact" ||
                         (specification.is_object() && specification.size() == 1 && specification.contains("exact"));
-  if (!is_exact) return make_reconstructor(specification, pointer);
+  if (!is_exact) return make_reconstructor(specification, pointer, further);
   if (specification.is_object()) JsonReader(specification["exact"], pointer + "/exact").finish();
   if (!has_field) raise("{}: exact gradients need an analytic field, but the frames come from files", pointer);
   return {"exact", "{}", nullptr};
@@ -126,7 +127,8 @@ int read_folds(JsonReader& reader, const MeshSource& mesh) {
   return static_cast<int>(folds);
 }
 
-ExperimentConfig read_config(const json& document, const std::filesystem::path& directory, const std::string& stem) {
+ExperimentConfig read_config(const json& document, const std::filesystem::path& directory, const std::string& stem,
+                             std::span<const ReconstructorEntry> further) {
   JsonReader reader(document, "");
   ExperimentConfig config;
   config.name = reader.text("name", stem);
@@ -172,7 +174,7 @@ ExperimentConfig read_config(const json& document, const std::filesystem::path& 
   filled.clear();
   for (const json& entry : read_list(reader, "reconstructors", json::array({"chandrashekar_garg"}))) {
     config.reconstructors.push_back(
-        read_reconstructor(entry, fmt::format("/reconstructors/{}", filled.size()), !config.fields.empty()));
+        read_reconstructor(entry, fmt::format("/reconstructors/{}", filled.size()), !config.fields.empty(), further));
     const MadeReconstructor& made = config.reconstructors.back();
     filled.push_back(json{{made.name, json::parse(made.options)}});
   }
@@ -201,7 +203,7 @@ ExperimentConfig read_config(const json& document, const std::filesystem::path& 
 }  // namespace
 
 ExperimentConfig read_experiment_config(const std::filesystem::path& path, const std::vector<std::string>& overrides,
-                                        bool reduced) {
+                                        bool reduced, std::span<const ReconstructorEntry> reconstructors) {
   json document = read_json_file(path);
   if (reduced && document.is_object() && document.contains("reduced")) {
     const json changes = document["reduced"];
@@ -210,7 +212,7 @@ ExperimentConfig read_experiment_config(const std::filesystem::path& path, const
   }
   for (const std::string& text : overrides) apply_override(document, text);
   try {
-    return read_config(document, path.parent_path(), path.stem().string());
+    return read_config(document, path.parent_path(), path.stem().string(), reconstructors);
   } catch (const Error& error) {
     raise("{}: {}", path.string(), error.what());
   }

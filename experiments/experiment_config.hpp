@@ -46,8 +46,8 @@ struct ExperimentConfig {
 };
 
 /// Reads a configuration file. `overrides` are "/json/pointer=VALUE"; `reduced` applies the object of that name first.
-/// Throws Error that names the file and the JSON pointer.
+/// `reconstructors` are known besides the registry's. Throws Error that names the file and the JSON pointer.
 ExperimentConfig read_experiment_config(const std::filesystem::path& path, const std::vector<std::string>& overrides,
-                                        bool reduced);
+                                        bool reduced, std::span<const ReconstructorEntry> reconstructors = {});
 
 }  // namespace halfgrad

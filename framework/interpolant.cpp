@@ -222,7 +222,7 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
   const auto has_plain_runs = [&]<class E>(const Runs<E>& runs) {
     return !is_fast(runs) || (!E::affine && !runs.extrapolates.empty());
   };
-  bool any_fast = false, any_plain = false;
+  bool any_fast = false, any_plain = weighted.num_points() > 0;
   for (const AnyRuns& any : blocks)
     std::visit(
         [&](const auto& runs) {
@@ -299,6 +299,8 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
     for (Index run = begin; run < end; ++run)
       if (runs.extrapolates[run]) plain(run, run + 1);
   });
+  if (weighted.num_points() > 0)
+    weighted_point_stage(values, gradients != nullptr ? *gradients : none, hessians != nullptr ? *hessians : none, out);
   std::fill(out + static_cast<Offset>(num_served) * values.cols(),
             out + static_cast<Offset>(report.num_points) * values.cols(), std::numeric_limits<Scalar>::quiet_NaN());
 }

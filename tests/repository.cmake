@@ -30,8 +30,9 @@ add_test(NAME install_consumer
          COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/install_consumer/run.sh ${PROJECT_BINARY_DIR}
                  ${PROJECT_SOURCE_DIR}/README.md)
 
+# The projects below examples/, each against an installed halfgrad.
 add_test(NAME examples
-         COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/examples/run.sh ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR}/examples)
+         COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/examples.sh ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR}/examples)
 
 set_tests_properties(headers_compile_alone missing_element_member_is_named install_consumer examples
                      PROPERTIES LABELS build)

@@ -13,6 +13,7 @@
 #include "framework/io/pvd.hpp"
 #include "framework/io/stl.hpp"
 #include "framework/io/tetgen.hpp"
+#include "framework/io/vtk_grid.hpp"
 #include "framework/io/vtk_legacy.hpp"
 #include "framework/io/vtk_xml.hpp"
 #include "framework/json_reader.hpp"
@@ -56,10 +57,11 @@ const std::vector<Format>& formats() {
       {"Gmsh", {".msh"}, true, read_gmsh, nullptr, nullptr},
       {"legacy VTK", {".vtk"}, true, read_vtk_legacy, nullptr, nullptr},
       {"VTK XML", {".vtu", ".vtp"}, true, read_vtk_xml, nullptr, nullptr},
+      {"VTK grid", {".vti", ".vtr"}, true, read_vtk_grid_cells, nullptr, nullptr, read_vtk_grid},
       {"MEDIT", {".mesh"}, true, read_medit, nullptr, nullptr},
       {"TetGen", {".node", ".ele"}, true, read_tetgen, nullptr, nullptr},
-      {"Wavefront OBJ", {".obj"}, false, read_obj, nullptr, create_obj_frames},
-      {"PLY", {".ply"}, false, read_ply, nullptr, nullptr},
+      {"Wavefront OBJ", {".obj"}, true, read_obj, nullptr, create_obj_frames},
+      {"PLY", {".ply"}, true, read_ply, nullptr, nullptr},
       {"STL", {".stl"}, false, read_stl, nullptr, nullptr},
       {"NumPy", {".npy"}, false, read_npy_geometry, open_npy_frames, create_npy_frames},
       {"PC2 point cache", {".pc2"}, false, nullptr, open_pc2_frames, create_pc2_frames},
