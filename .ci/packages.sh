@@ -2,9 +2,13 @@
 # Sourced by quickstart, run-tests and .ci/run.
 
 build_packages=(g++ cmake ninja-build libeigen3-dev libfmt-dev nlohmann-json3-dev libtbb-dev libhwy-dev
-  libfast-float-dev libpugixml-dev zlib1g-dev libcli11-dev)
-test_packages=(libgtest-dev libgmock-dev)
+  libfast-float-dev libpugixml-dev zlib1g-dev libcli11-dev libnanoflann-dev libzip-dev pkg-config)
+test_packages=(libgtest-dev libgmock-dev python3-scipy)
 check_packages=(clang-format)
+browser_packages=(chromium)
+# npm bundles the interactive report; a Node.js from elsewhere brings its own and conflicts with Debian's.
+web_packages=()
+command -v npm >/dev/null || web_packages=(npm)
 
 # install_packages NAME...: leaves apt alone where nothing is missing.
 install_packages() {

@@ -4,27 +4,36 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "apps/binding.hpp"
 #include "apps/progress.hpp"
 
 namespace halfgrad::app {
 
 struct DeformOptions {
-  std::filesystem::path rest, points, out, report;
+  BindOptions bind;
+  std::filesystem::path out, report;
   std::string frames;
-  std::string interpolant = "phong";
-  std::optional<double> alpha;
-  std::string reconstructor;  ///< a name or JSON; empty: adaptive, or for dual_taylor kriging with cubic drift
-  std::string outside = "error";
   double tolerance = 0;
-  bool normals = false, gradients = false;
+  std::optional<std::string> normals;  ///< "gradient" or "smooth"
+  bool gradients = false, stretch = false;
+  std::vector<std::string> fields;  ///< NAME or NAME=FILE.npy each
   std::string precision = "double";
   std::int64_t first = 0, last = -1, step = 1;  ///< frames; −1 is the last one
+  bool resume = false;
   ProgressMode progress = ProgressMode::terminal;
   bool quiet = false;
 };
 
-/// Runs the command; throws Error on bad input, before the output bears its name.
+/// A signal ended the run between two frames; what() says how to go on.
+struct Interrupted : std::runtime_error {
+  Interrupted(const std::string& what, int number) : std::runtime_error(what), signal(number) {}
+  int signal;
+};
+
+/// Runs the command; throws Error on bad input, before the output bears its name, and Interrupted on SIGINT and
+/// SIGTERM.
 void deform(const DeformOptions& options);
 
 }  // namespace halfgrad::app

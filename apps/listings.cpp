@@ -10,6 +10,7 @@
 #include "framework/interpolation_rule.hpp"
 #include "framework/io/mesh_file.hpp"
 #include "framework/mesh.hpp"
+#include "framework/scattered_transfer.hpp"
 #include "reconstruction/registry.hpp"
 
 namespace halfgrad::app {
@@ -55,6 +56,7 @@ void list(const std::string& what, bool as_json) {
   all["elements"] = element_list();
   all["reconstructors"] = named_list(reconstructor_registry());
   all["interpolants"] = named_list(named_rules());
+  for (json& entry : named_list(scattered_rules())) all["interpolants"].push_back(entry);
   all["fields"] = named_list(field_registry());
   if (!what.empty()) {
     if (!all.contains(what)) raise("list {}: expected elements, reconstructors, interpolants or fields", what);

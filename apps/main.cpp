@@ -3,14 +3,20 @@
 #include <tbb/global_control.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
 
 #include "apps/deform.hpp"
+#include "apps/deform_scattered.hpp"
+#include "apps/describe.hpp"
+#include "apps/export.hpp"
 #include "apps/listings.hpp"
 #include "experiments/experiment.hpp"
+#include "experiments/merged_report.hpp"
 #include "framework/error.hpp"
+#include "framework/json_reader.hpp"
 #include "framework/version.hpp"
 
 namespace {
@@ -25,12 +31,13 @@ constexpr const char* first_words =
     "\n"
     "  halfgrad deform --rest mesh.msh --frames frames.npy --points surface.obj --out out.npy\n"
     "      carry points through a sequence\n"
+    "  halfgrad export --rest mesh.msh --points surface.obj --out map.npz\n"
+    "      write the map itself, for SciPy, a game engine or a shader to apply\n"
     "  halfgrad run configs/quickstart.json --out out/quickstart\n"
     "      run an experiment: errors, orders and run times of interpolants and reconstructors\n"
-    "  halfgrad info mesh.msh\n"
-    "      what is in a mesh\n"
     "\n"
-    "halfgrad --help lists all commands; halfgrad COMMAND --help explains one.\n";
+    "halfgrad info mesh.msh shows what is in a mesh; halfgrad --help lists all commands, halfgrad COMMAND --help\n"
+    "explains one with an example.\n";
 
 struct RunCommand {
   std::filesystem::path config, out = "results";
@@ -65,6 +72,67 @@ int run(const RunCommand& command, ProgressMode mode, bool quiet) {
   return expectation_failed;
 }
 
+CommandFacts facts_of(const CLI::App& app) {
+  CommandFacts facts{app.get_name(), app.get_description(), app.get_footer(), {}};
+  if (facts.example.starts_with("Example: ")) facts.example.erase(0, 9);
+  for (const CLI::Option* option : app.get_options()) {
+    OptionFacts entry;
+    entry.name = option->get_positional() ? option->get_name(true) : "--" + option->get_lnames().front();
+    // Every command has --help; the program's own stands for all.
+    if (entry.name == "--help" && app.get_parent() != nullptr) continue;
+    entry.description = option->get_description();
+    entry.fallback = option->get_default_str();
+    entry.required = option->get_required();
+    entry.words = known_words(facts.name, entry.name);
+    const std::string type = option->get_type_name();
+    if (option->get_items_expected() > 0)
+      entry.value = type.starts_with("INT") || type.starts_with("FLOAT") ? "NUMBER" : type;
+    facts.options.push_back(std::move(entry));
+  }
+  return facts;
+}
+
+ProgramFacts facts_of_program(const CLI::App& program) {
+  ProgramFacts facts{facts_of(program), {}};
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
+    facts.commands.push_back(facts_of(*command));
+  return facts;
+}
+
+// What --help shows as an option's argument; CLI11 calls both file names and words TEXT.
+void name_arguments(CLI::App& app) {
+  for (CLI::Option* option : app.get_options())
+    if (option->get_items_expected() > 0 && option->get_type_name() == "TEXT")
+      option->type_name(known_words(app.get_name(), option->get_name(option->get_positional())).empty() ? "FILE"
+                                                                                                        : "WORD");
+}
+
+// Says what was wrong with the command line and what to type next.
+[[noreturn]] void refuse_usage(const CLI::App& program, const CLI::ParseError& error) {
+  const std::vector<CLI::App*> parsed = program.get_subcommands();
+  const ProgramFacts facts = facts_of_program(program);
+  const CommandFacts command = parsed.empty() ? facts.shared : facts_of(*parsed.front());
+  const std::string name = parsed.empty() ? "halfgrad" : "halfgrad " + command.name;
+  const std::string more = fmt::format("see {} --help", name) +
+                           (command.example.empty() ? "" : fmt::format(", or for example: {}", command.example));
+
+  const std::vector<std::string> unknown = program.remaining(true);
+  if (unknown.empty())
+    raise("{}{}; {}", error.what(), error.get_name() == "ConversionError" ? ", expected a number" : "", more);
+  const std::string& word = unknown.front();
+  if (!parsed.empty() && word.front() != '-') raise("{}: expected an option before it; {}", word, more);
+  std::vector<std::string> names;
+  if (parsed.empty())
+    for (const CommandFacts& known : facts.commands) names.push_back(known.name);
+  for (const std::vector<OptionFacts>& options : {command.options, facts.shared.options})
+    for (const OptionFacts& option : options)
+      if (!option.positional()) names.push_back(option.name);
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  const std::string nearest = nearest_name(word, known);
+  raise("{} is no {} of {}; {}; {}", word, parsed.empty() ? "command" : "option", name,
+        nearest.empty() ? fmt::format("known: {}", join_names(known)) : fmt::format("did you mean {}?", nearest), more);
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App program("Carries detailed points through the deformation of a coarse mesh.", "halfgrad");
   program.set_version_flag("--version", std::string("halfgrad ") + version);
@@ -80,47 +148,99 @@ int dispatch(int argc, char** argv) {
   CLI::App* run_app = program.add_subcommand("run", "Run an experiment and write results.json");
   run_app->add_option("config", command.config, "Configuration, JSON")->required();
   run_app->add_option("--out", command.out, "Folder for the results")->capture_default_str();
-  run_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")->take_all();
+  run_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")
+      ->take_all()
+      ->type_name("KEY=VALUE");
   run_app->add_flag("--reduced", command.reduced, "Apply the configuration's \"reduced\" object: the quick version");
   run_app->footer("Example: halfgrad run configs/quickstart.json --out out/quickstart --set /seed=3");
 
   CLI::App* check_app = program.add_subcommand("check", "Validate a configuration only");
   check_app->add_option("config", command.config, "Configuration, JSON")->required();
-  check_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")->take_all();
+  check_app->add_option("--set", command.overrides, "Override a key, /json/pointer=VALUE")
+      ->take_all()
+      ->type_name("KEY=VALUE");
   check_app->footer("Example: halfgrad check configs/quickstart.json");
 
+  const auto add_bind_options = [](CLI::App* app, BindOptions& bind, const std::string& preferred) {
+    app->add_option("--rest", bind.rest,
+                    "Rest mesh, grid or surface: .msh .vtk .vtu .mesh .node/.ele .vti .vtr .obj .ply");
+    app->add_option("--points", bind.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy");
+    app->add_option("--interpolant", bind.interpolant,
+                    "A name, or JSON with options; see halfgrad list interpolants (default: phong)");
+    app->add_option("--alpha", bind.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
+    app->add_option(
+        "--reconstructor", bind.reconstructor,
+        "A name, or JSON such as '{\"kriging\": {\"drift\": \"cubic\"}}'; see halfgrad list reconstructors (default: " +
+            preferred + "; for dual_taylor kriging with cubic drift)");
+    app->add_option("--outside", bind.outside, "Points outside the mesh: error, nearest or mark (default: error)");
+  };
   DeformOptions options;
   CLI::App* deform_app = program.add_subcommand("deform", "Carry points through a sequence");
-  deform_app->add_option("--rest", options.rest, "Rest mesh: .msh .vtk .vtu .mesh .node/.ele")->required();
+  add_bind_options(deform_app, options.bind, "adaptive");
+  deform_app->add_option("--binding", options.bind.binding,
+                         "In place of --rest and --points: what halfgrad bind wrote");
   deform_app
       ->add_option("--frames", options.frames,
                    "Deformed vertices: .npy .pc2 .pvd, or a pattern of files (x.%04d.vtu, frames/*.vtu)")
       ->required();
-  deform_app->add_option("--points", options.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy")->required();
   deform_app->add_option("--out", options.out, "Output: .npy .pc2 .obj (name.%04d.obj) .pvd")->required();
-  CLI::Option* interpolant =
-      deform_app->add_option("--interpolant", options.interpolant, "See halfgrad list interpolants")
-          ->capture_default_str();
-  deform_app->add_option("--alpha", options.alpha, "Blend of vertex_blend: 0 linear, 0.5 phong, 1 vertex models");
-  deform_app->add_option("--reconstructor", options.reconstructor,
-                         "A name or JSON; see halfgrad list reconstructors (default: adaptive; for dual_taylor kriging "
-                         "with cubic drift)");
-  deform_app->add_option("--outside", options.outside, "Points outside the mesh: error, nearest or mark")
-      ->capture_default_str();
   deform_app
       ->add_option("--tolerance", options.tolerance,
                    "Length: cells that differ from linear by less are evaluated linearly")
       ->capture_default_str();
-  deform_app->add_flag("--normals", options.normals, "Also carry the surface's normals");
+  deform_app
+      ->add_option("--normals", options.normals,
+                   "Also carry the surface's normals: gradient (of the map, default) or smooth (across cells)")
+      ->expected(0, 1)
+      ->default_str("gradient");
   deform_app->add_flag("--gradients", options.gradients, "Also write deformation gradients at the points");
+  deform_app->add_flag("--stretch", options.stretch, "Also write principal stretches at the points");
+  deform_app
+      ->add_option("--field", options.fields,
+                   "Also carry a field of the vertices: NAME of point data in the frame files or the rest mesh, or "
+                   "NAME=FILE.npy")
+      ->take_all();
   deform_app->add_option("--precision", options.precision, "float or double")->capture_default_str();
   deform_app->add_option("--first", options.first, "First frame, from 0")->capture_default_str();
   deform_app->add_option("--last", options.last, "Last frame (default: the last one)")->check(CLI::NonNegativeNumber);
   deform_app->add_option("--step", options.step, "Take every step-th frame")->capture_default_str();
+  deform_app->add_flag("--resume", options.resume, "Go on behind the frames that the same command left");
   deform_app->add_option("--report", options.report, "Write times, counts and points outside as JSON");
   deform_app->footer(
       "Example: halfgrad deform --rest cage.msh --frames sim.npy --points render.obj --out render.pc2 --precision "
       "float");
+
+  BindOptions bind;
+  std::filesystem::path binding;
+  CLI::App* bind_app = program.add_subcommand("bind", "Locate points once and save that for many runs of deform");
+  add_bind_options(bind_app, bind, "adaptive");
+  bind_app->add_option("--out", binding, "Output: .hgb")->required();
+  bind_app->footer(
+      "Example: halfgrad bind --rest cage.msh --points render.obj --out render.hgb\n"
+      "         halfgrad deform --binding render.hgb --frames shot12.npy --out shot12.pc2");
+
+  std::vector<std::filesystem::path> result_folders;
+  std::filesystem::path report_file = "report.html";
+  CLI::App* report_app = program.add_subcommand("report", "Show the results of several runs in one page");
+  report_app->add_option("folders", result_folders, "Folders that halfgrad run wrote")->required();
+  report_app->add_option("--out", report_file, "The page, HTML")->capture_default_str();
+  report_app->footer("Example: halfgrad report out/lattice out/jittered --out out/both.html");
+
+  ExportOptions map;
+  CLI::App* export_app = program.add_subcommand("export", "Write the map from vertices to points for other programs");
+  add_bind_options(export_app, map.bind, "kriging");
+  export_app->add_option("--binding", map.bind.binding, "In place of --rest and --points: what halfgrad bind wrote");
+  export_app
+      ->add_option("--out", map.out, "Output: .npz (SciPy, or stencils) .mtx (Matrix Market) .json (affine bones)")
+      ->required();
+  export_app->add_option("--as", map.as, "matrix, stencils or bones (default: .json holds bones, others a matrix)");
+  export_app->add_option("--precision", map.precision, "float or double")->capture_default_str();
+  export_app->add_flag("--transpose", map.transpose, "Write the matrix's transpose, which carries forces");
+  export_app->add_option("--frames", map.frames, "Deformed vertices, for the transforms of bones");
+  export_app->add_option("--first", map.first, "First frame, from 0")->capture_default_str();
+  export_app->add_option("--last", map.last, "Last frame (default: the last one)")->check(CLI::NonNegativeNumber);
+  export_app->add_option("--step", map.step, "Take every step-th frame")->capture_default_str();
+  export_app->footer("Example: halfgrad export --rest cage.msh --points render.obj --out map.npz");
 
   std::string what;
   bool as_json = false;
@@ -135,10 +255,19 @@ int dispatch(int argc, char** argv) {
   info_app->add_flag("--json", as_json, "Print JSON");
   info_app->footer("Example: halfgrad info cage.msh");
 
+  std::string format;
+  CLI::App* describe_app =
+      program.add_subcommand("describe", "Print shell completion, the manual page or the command reference");
+  describe_app->add_option("format", format, "bash, zsh, fish, man or markdown")->required();
+  describe_app->footer("Example: halfgrad describe bash > ~/.local/share/bash-completion/completions/halfgrad");
+
+  name_arguments(program);
+  for (CLI::App* command_app : program.get_subcommands([](CLI::App*) { return true; })) name_arguments(*command_app);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return program.exit(error) == 0 ? all_well : bad_input;
+    if (error.get_exit_code() != 0) refuse_usage(program, error);
+    return program.exit(error);
   }
   std::unique_ptr<tbb::global_control> limit;
   if (threads > 0)
@@ -151,10 +280,27 @@ int dispatch(int argc, char** argv) {
     return run(command, mode, quiet);
   }
   if (deform_app->parsed()) {
-    if (options.alpha && interpolant->count() == 0) options.interpolant = "vertex_blend";
     options.progress = mode;
     options.quiet = quiet;
-    deform(options);
+    if (is_scattered(options.bind.interpolant.value_or("phong")))
+      deform_scattered(options);
+    else
+      deform(options);
+    return all_well;
+  }
+  if (report_app->parsed()) {
+    write_merged_report(result_folders, report_file);
+    if (!quiet) fmt::print("written: {}\n", report_file.string());
+    return all_well;
+  }
+  if (bind_app->parsed()) {
+    save_binding(bind, binding, quiet);
+    return all_well;
+  }
+  if (export_app->parsed()) {
+    map.progress = mode;
+    map.quiet = quiet;
+    export_map(map);
     return all_well;
   }
   if (list_app->parsed()) {
@@ -163,6 +309,10 @@ int dispatch(int argc, char** argv) {
   }
   if (info_app->parsed()) {
     info(mesh, as_json);
+    return all_well;
+  }
+  if (describe_app->parsed()) {
+    fmt::print("{}", describe(facts_of_program(program), format));
     return all_well;
   }
   fmt::print("{}", first_words);
@@ -177,6 +327,12 @@ int main(int argc, char** argv) {
   } catch (const halfgrad::Error& error) {
     fmt::print(stderr, "halfgrad: {}\n", error.what());
     return bad_input;
+  } catch (const halfgrad::app::Interrupted& interrupted) {
+    fmt::print(stderr, "halfgrad: {}\n", interrupted.what());
+    // Ends as the signal would have, so that shells and queues see it.
+    std::signal(interrupted.signal, SIG_DFL);
+    std::raise(interrupted.signal);
+    return internal_failure;
   } catch (const std::exception& error) {
     fmt::print(stderr, "halfgrad: internal failure: {}\n", error.what());
     return internal_failure;

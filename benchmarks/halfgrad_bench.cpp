@@ -20,7 +20,9 @@
 #include "framework/error.hpp"
 #include "framework/interpolant.hpp"
 #include "framework/point_selection.hpp"
+#include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
+#include "reconstruction/kriging.hpp"
 
 namespace halfgrad::benchmarks {
 namespace {
@@ -107,6 +109,13 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
   for (std::size_t s = 0; s < sorted.size(); s += 10) every_tenth.push_back(sorted[s]);
   auto near_tenth = bound(float(), "phong", select_points(embedding, sorted.first(every_tenth.size())));
   auto sparse_tenth = bound(float(), "phong", select_points(embedding, every_tenth));
+  // What the stencils of other reconstructors cost.
+  const auto bound_with = [&](const VertexGradientReconstructor& reconstructor, const char* rule) {
+    const Reconstruction own = reconstructor.reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+    return Frame<float>{Interpolant<float>(mesh, embedding, named_rule(rule), &own), {}, {}};
+  };
+  auto phong_lean = bound_with(Kriging({.patch = KrigingPatch::lean}), "phong");
+  auto phong_kriging = bound_with(Kriging(), "phong"), phong_adaptive = bound_with(Adaptive(), "phong");
   const Values<float> values = workload.deformed.cast<float>();
   MovingTenth moving(mesh.vertices(), values);
 
@@ -117,6 +126,9 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
   std::vector<Operation> operations = {
       {"linear", frames, [&] { linear.sorted(values); }},
       {"phong", frames, [&] { phong.sorted(values); }},
+      {"phong_lean", frames, [&] { phong_lean.sorted(values); }},
+      {"phong_kriging", frames, [&] { phong_kriging.sorted(values); }},
+      {"phong_adaptive", frames, [&] { phong_adaptive.sorted(values); }},
       {"phong_double", frames, [&] { phong_double.sorted(workload.deformed); }},
       {"linear_user_order", frames, [&] { linear_user.user_order(values); }},
       {"phong_user_order", frames, [&] { phong_user.user_order(values); }},
@@ -132,7 +144,7 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
   const bool all_tetrahedra = mesh.blocks().size() == 1 && element_name(mesh, 0) == Tetrahedron::name;
   std::optional<ScalarLinear> scalar_linear;
   std::optional<PaperStyle> paper_style;
-  std::optional<Frame<float>> hermite, dual_taylor;
+  std::optional<Frame<float>> hermite, dual_taylor, dual_taylor_kriging;
   if (all_tetrahedra) {
     scalar_linear.emplace(mesh, embedding);
     paper_style.emplace(mesh, embedding, workload.points);
@@ -143,6 +155,8 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
                                                   0);
     dual_taylor.emplace(
         Frame<float>{Interpolant<float>(mesh, embedding, named_rule("dual_taylor"), &with_hessians), {}, {}});
+    dual_taylor_kriging.emplace(bound_with(Kriging({.drift = KrigingDrift::cubic}), "dual_taylor"));
+    operations.push_back({"dual_taylor_kriging", frames, [&] { dual_taylor_kriging->sorted(values); }});
     operations.push_back({"hermite", frames, [&] { hermite->sorted(values); }});
     operations.push_back({"dual_taylor", frames, [&] { dual_taylor->sorted(values); }});
     operations.push_back({"scalar_linear", frames, [&] { scalar_linear->evaluate(values.data(), copied.data()); }});

@@ -17,7 +17,7 @@ namespace {
 /// What a bound limits, and from which side.
 struct BoundKind {
   std::string_view key;
-  enum Quantity { order, gain, error, max_abs_sum } quantity;
+  enum Quantity { order, gain, error, max_abs_sum, sigma, time_over_linear } quantity;
   bool at_least;
 };
 constexpr std::array bound_kinds = {
@@ -27,7 +27,11 @@ constexpr std::array bound_kinds = {
     BoundKind{"gain_at_most", BoundKind::gain, false},
     BoundKind{"error_at_least", BoundKind::error, true},
     BoundKind{"error_at_most", BoundKind::error, false},
+    BoundKind{"max_abs_sum_at_least", BoundKind::max_abs_sum, true},
     BoundKind{"max_abs_sum_at_most", BoundKind::max_abs_sum, false},
+    BoundKind{"sigma_at_least", BoundKind::sigma, true},
+    BoundKind{"sigma_at_most", BoundKind::sigma, false},
+    BoundKind{"time_over_linear_at_most", BoundKind::time_over_linear, false},
 };
 
 const BoundKind& kind_of(const std::string& key) {
@@ -94,9 +98,15 @@ std::vector<double> measured_rows(const Expectation& expected, BoundKind::Quanti
     const int region = static_cast<int>(expected.region);
     std::optional<double> value;
     if (quantity == BoundKind::gain)
-      value = expected.norm == Norm::rms ? row.gain_over_linear[region] : row.max_gain_over_linear[region];
+      value = expected.norm == Norm::rms   ? row.gain_over_linear[region]
+              : expected.norm == Norm::max ? row.max_gain_over_linear[region]
+                                           : std::nullopt;
     else if (quantity == BoundKind::max_abs_sum)
       value = row.max_abs_sum;
+    else if (quantity == BoundKind::sigma)
+      value = row.sigma;
+    else if (quantity == BoundKind::time_over_linear)
+      value = row.time_over_linear;
     else if (row.error[region].points > 0)
       value = row.error[region][expected.norm];
     if (value) values.push_back(*value);

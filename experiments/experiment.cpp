@@ -7,8 +7,13 @@
 #include <numeric>
 
 #include "experiments/experiment_config.hpp"
+#include "experiments/hold_out.hpp"
 #include "experiments/html_report.hpp"
+#include "experiments/interactive_report.hpp"
+#include "experiments/recommendation.hpp"
 #include "experiments/report.hpp"
+#include "experiments/scene.hpp"
+#include "experiments/sequence_writer.hpp"
 #include "framework/error.hpp"
 #include "framework/io/frame_source.hpp"
 #include "reconstruction/cell_averages.hpp"
@@ -32,40 +37,34 @@ double median_seconds(int repetitions, Work&& work) {
 /// The deformed vertices and true points of a level, one frame at a time.
 class FrameSequence {
  public:
-  FrameSequence(const ExperimentConfig& config, const Mesh& mesh, const Points& points, int level)
-      : config_(config), mesh_(mesh), points_(points) {
-    if (config.field) {
-      numbers_ = {0};
+  FrameSequence(const ExperimentConfig& config, const Mesh& mesh, const Points& points, int level,
+                const HeldOutMesh* held_out)
+      : config_(config), mesh_(mesh), points_(points), held_out_(held_out) {
+    if (!config.files) {
+      numbers_.resize(config.fields.size());
+      std::iota(numbers_.begin(), numbers_.end(), 0);
       return;
     }
     frames_ = open_frames(config.files->frames[level].string());
-    truth_ = open_frames(config.files->truth.string());
-    if (frames_->num_vertices() != mesh.num_vertices())
+    const Offset num_vertices = mesh.num_vertices() + (held_out == nullptr ? 0 : points.rows());
+    if (frames_->num_vertices() != num_vertices)
       raise("{}: frames of {} vertices, but the mesh has {}", config.files->frames[level].string(),
-            frames_->num_vertices(), mesh.num_vertices());
-    if (truth_->num_vertices() != points.rows())
-      raise("{}: {} true points, but there are {} points", config.files->truth.string(), truth_->num_vertices(),
-            points.rows());
-    if (truth_->num_frames() != frames_->num_frames() || truth_->num_columns() != frames_->num_columns())
-      raise("{}: {} frames of {} coordinates, but {} has {} of {}", config.files->truth.string(), truth_->num_frames(),
-            truth_->num_columns(), config.files->frames[level].string(), frames_->num_frames(), frames_->num_columns());
-    const int count = static_cast<int>(frames_->num_frames());
-    if (config.files->select.empty()) {
-      numbers_.resize(count);
-      std::iota(numbers_.begin(), numbers_.end(), 0);
-    }
-    for (const int number : config.files->select) {
-      numbers_.push_back(number < 0 ? count + number : number);
-      if (numbers_.back() < 0 || numbers_.back() >= count) raise("/field/select: frame {} of {} frames", number, count);
-    }
+            frames_->num_vertices(), num_vertices);
+    if (held_out == nullptr) open_truth(level);
+    select_frames();
   }
 
   const std::vector<int>& numbers() const { return numbers_; }
 
   void read(int frame, Points& values, Points& truth) {
-    if (config_.field) {
-      values = field_values(*config_.field, mesh_.vertices());
-      truth = field_values(*config_.field, points_);
+    if (!config_.files) {
+      values = field_values(*config_.fields[frame], mesh_.vertices());
+      truth = field_values(*config_.fields[frame], points_);
+    } else if (held_out_ != nullptr) {
+      Points all;
+      frames_->read(frame, all);
+      values = all(held_out_->kept, Eigen::all);
+      truth = all(held_out_->held_out, Eigen::all);
     } else {
       frames_->read(frame, values);
       truth_->read(frame, truth);
@@ -73,31 +72,56 @@ class FrameSequence {
   }
 
  private:
+  void open_truth(int level) {
+    truth_ = open_frames(config_.files->truth.string());
+    if (truth_->num_vertices() != points_.rows())
+      raise("{}: {} true points, but there are {} points", config_.files->truth.string(), truth_->num_vertices(),
+            points_.rows());
+    if (truth_->num_frames() != frames_->num_frames() || truth_->num_columns() != frames_->num_columns())
+      raise("{}: {} frames of {} coordinates, but {} has {} of {}", config_.files->truth.string(), truth_->num_frames(),
+            truth_->num_columns(), config_.files->frames[level].string(), frames_->num_frames(),
+            frames_->num_columns());
+  }
+
+  void select_frames() {
+    const int count = static_cast<int>(frames_->num_frames());
+    if (config_.files->select.empty()) {
+      numbers_.resize(count);
+      std::iota(numbers_.begin(), numbers_.end(), 0);
+    }
+    for (const int number : config_.files->select) {
+      numbers_.push_back(number < 0 ? count + number : number);
+      if (numbers_.back() < 0 || numbers_.back() >= count) raise("/field/select: frame {} of {} frames", number, count);
+    }
+  }
+
   const ExperimentConfig& config_;
   const Mesh& mesh_;
   const Points& points_;
+  const HeldOutMesh* held_out_;
   std::unique_ptr<FrameSource> frames_, truth_;
   std::vector<int> numbers_;
 };
 
 /// An interpolant bound with a reconstructor, and what bind tells of it.
 struct BoundRule {
-  Interpolant<double> interpolant;
+  std::optional<Interpolant<double>> interpolant;  ///< none for rules that know vertices only
+  std::optional<ScatteredTransfer> scattered = std::nullopt;
   bool is_exact = false;
   ResultRow facts;  ///< what is the same for all frames
 };
 
-/// √mean (n w' − 1)² over the cells of all vertices: 0 for equal weights, large where weights are fitted to noise.
-std::optional<double> weight_spread(const VertexGradientReconstructor& reconstructor, const CellGradients& cells,
-                                    const std::vector<Index>& vertices) {
+/// James 2020, Fig. 6: σ = √(Σ (w'_k − 1)² / n) over the cells of all vertices. Weights sum to one at each vertex, so
+/// that σ is a little below 1 for harmless weights, and large where they are fitted to noise.
+std::optional<double> weight_deviation(const VertexGradientReconstructor& reconstructor, const CellGradients& cells,
+                                       const std::vector<Index>& vertices) {
   const auto* average = dynamic_cast<const CellAverage*>(&reconstructor);
   if (average == nullptr) return std::nullopt;
   double sum = 0;
   std::size_t count = 0;
   for (const Index vertex : vertices) {
     const CellWeights weights = average->weights(cells, vertex);
-    const double n = static_cast<double>(weights.weights.size());
-    for (const double weight : weights.weights) sum += (n * weight - 1) * (n * weight - 1);
+    for (const double weight : weights.weights) sum += (weight - 1) * (weight - 1);
     count += weights.weights.size();
   }
   if (count == 0) return std::nullopt;
@@ -140,34 +164,82 @@ std::string element_names(const Mesh& mesh) {
   return names;
 }
 
-/// One level of one configuration.
+void add_gains(std::span<ResultRow> frame) {
+  const auto linear =
+      std::find_if(frame.begin(), frame.end(), [](const ResultRow& row) { return row.interpolant == "linear"; });
+  if (linear == frame.end()) return;
+  const std::array<RegionError, 3> reference = linear->error;
+  const double linear_seconds = linear->evaluate_seconds;
+  for (ResultRow& row : frame) {
+    if (linear_seconds > 0) row.time_over_linear = (row.gradients_seconds + row.evaluate_seconds) / linear_seconds;
+    for (int region = 0; region < 3; ++region) {
+      const RegionError& error = row.error[region];
+      if (reference[region].rms > 0 && error.rms > 0) row.gain_over_linear[region] = reference[region].rms / error.rms;
+      if (reference[region].max > 0 && error.max > 0)
+        row.max_gain_over_linear[region] = reference[region].max / error.max;
+    }
+  }
+}
+
+/// What a level gives besides its rows, where asked for.
+struct LevelOutputs {
+  LevelPicture* picture = nullptr;
+  std::string* scene = nullptr;                ///< JSON for the interactive report
+  std::filesystem::path sequence_folder = {};  ///< for every rule's deformed points
+  std::vector<std::string> files = {};         ///< written into it
+};
+
+/// One level of one configuration, or one fold of vertices held out.
 class LevelRun {
  public:
   LevelRun(const ExperimentConfig& config, int level, std::function<void(std::string_view, double)> progress)
       : config_(config),
         level_(level),
         progress_(std::move(progress)),
-        mesh_(config.mesh.make(level)),
+        grid_(config.mesh.make_grid ? std::optional(config.mesh.make_grid(level)) : std::nullopt),
+        mesh_(grid_ ? grid_->mesh() : config.mesh.make(level)),
         cloud_(config.points(mesh_, config.mesh.is_zoom ? 0 : level)) {}
 
-  std::vector<ResultRow> run(LevelPicture* picture) {
+  LevelRun(const ExperimentConfig& config, const Mesh& whole, HeldOutMesh held_out,
+           std::function<void(std::string_view, double)> progress)
+      : config_(config),
+        level_(0),
+        progress_(std::move(progress)),
+        held_out_(std::move(held_out)),
+        mesh_(held_out_->mesh),
+        cloud_{whole.vertices()(held_out_->held_out, Eigen::all), {}} {}
+
+  std::vector<ResultRow> run(LevelOutputs& outputs) {
+    LevelPicture* const picture = outputs.picture;
     bind(picture);
-    FrameSequence frames(config_, mesh_, cloud_.positions, level_);
+    FrameSequence frames(config_, mesh_, cloud_.positions, level_, held_out_ ? &*held_out_ : nullptr);
     std::vector<ResultRow> rows;
     Points values, truth;
     const std::vector<int>& numbers = frames.numbers();
+    std::optional<SceneRecorder> recorder;
+    std::optional<SequenceWriter> writer;
+    if (!outputs.sequence_folder.empty()) {
+      std::vector<ResultRow> facts;
+      for (const BoundRule& rule : rules_) facts.push_back(rule.facts);
+      writer.emplace(outputs.sequence_folder, mesh_, cloud_, facts);
+    }
+    if (outputs.scene != nullptr) recorder.emplace(mesh_, cloud_, numbers.size(), rules_.size());
+    std::vector<Points> results(rules_.size());
     for (std::size_t f = 0; f < numbers.size(); ++f) {
       progress_(fmt::format("level {}: frame {}", level_, numbers[f]), 0.5 + 0.5 * double(f) / double(numbers.size()));
       frames.read(numbers[f], values, truth);
       const std::size_t first = rows.size();
-      for (const BoundRule& rule : rules_) {
-        Points result;
-        rows.push_back(measure(rule, numbers[f], values, truth, result));
+      for (std::size_t r = 0; r < rules_.size(); ++r) {
+        rows.push_back(measure(rules_[r], numbers[f], values, truth, results[r]));
         if (picture != nullptr && f + 1 == numbers.size())
-          picture->errors.emplace_back(rows.back(), (result - truth).rowwise().norm());
+          picture->errors.emplace_back(rows.back(), (results[r] - truth).rowwise().norm());
       }
-      add_gains(rows, first);
+      if (recorder && recorder->wants(f)) recorder->add(numbers[f], values, truth, results);
+      if (writer) writer->add(values, truth, results);
+      add_gains(std::span(rows).subspan(first));
     }
+    if (recorder) *outputs.scene = recorder->text();
+    if (writer) outputs.files = writer->finish();
     if (picture != nullptr) {
       picture->mesh = mesh_;
       picture->cloud = cloud_;
@@ -186,14 +258,16 @@ class LevelRun {
     facts.cells = mesh_.num_cells();
     facts.h = mean_edge_length(mesh_);
     facts.points = static_cast<Index>(cloud_.positions.rows());
-    facts.locate_seconds = median_seconds(
-        config_.repetitions, [&] { embedding = embed(mesh_, cloud_.positions, {.outside = config_.outside}); });
+    facts.locate_seconds = median_seconds(config_.repetitions, [&] {
+      const EmbedOptions options{.outside = config_.outside};
+      embedding = grid_ ? embed(*grid_, cloud_.positions, options) : embed(mesh_, cloud_.positions, options);
+    });
     facts.outside_points = static_cast<Index>(embedding.outside.size());
     place_points(embedding);
-    const std::vector<Index> active = active_vertices(mesh_, embedding);
+    const std::vector<Index> active = grid_ ? active_vertices(*grid_, embedding) : active_vertices(mesh_, embedding);
 
     for (const ConfiguredInterpolant& named : config_.interpolants)
-      if (!named.rule.needs_gradients()) add_rule(embedding, named, facts, nullptr, nullptr);
+      if (!named.needs_gradients()) add_rule(embedding, named, facts, nullptr, nullptr);
     for (std::size_t r = 0; r < config_.reconstructors.size(); ++r) {
       const MadeReconstructor& made = config_.reconstructors[r];
       progress_(fmt::format("level {}: {}", level_, made.name),
@@ -204,16 +278,17 @@ class LevelRun {
       Reconstruction reconstruction;
       if (made.reconstructor) {
         own.reconstruct_seconds = median_seconds(config_.repetitions, [&] {
-          const CellGradients cells(mesh_);
-          reconstruction = made.reconstructor->reconstruct(cells, active);
+          reconstruction = grid_ ? made.reconstructor->reconstruct_on_grid(*grid_, active)
+                                 : made.reconstructor->reconstruct(CellGradients(mesh_), active);
         });
-        own.sigma = weight_spread(*made.reconstructor, CellGradients(mesh_), active);
+        own.sigma = weight_deviation(*made.reconstructor, CellGradients(mesh_), active);
         if (picture != nullptr) picture->stencils.emplace_back(made.name, reconstruction.stencils);
       }
       for (const ConfiguredInterpolant& named : config_.interpolants) {
-        if (!named.rule.needs_gradients()) continue;
+        if (!named.needs_gradients()) continue;
         // Pairs that cannot be are left out, so that one list of each serves a whole table.
-        if (named.rule.needs_hessians() && made.reconstructor && !reconstruction.stencils.has_hessians()) continue;
+        if (named.needs_hessians() && made.reconstructor && !reconstruction.stencils.has_hessians()) continue;
+        if (named.scattered && (!made.reconstructor || reconstruction.blend)) continue;
         add_rule(embedding, named, own, &made, &reconstruction);
       }
     }
@@ -222,15 +297,43 @@ class LevelRun {
 
   void add_rule(const Embedding& embedding, const ConfiguredInterpolant& named, ResultRow facts,
                 const MadeReconstructor* made, const Reconstruction* reconstruction) {
+    if (named.scattered) {
+      add_scattered(named, std::move(facts), made);
+      return;
+    }
     const bool is_exact = made != nullptr && !made->reconstructor;
-    BoundRule rule{{mesh_, embedding, named.rule, is_exact ? nullptr : reconstruction}, is_exact, std::move(facts)};
+    const Reconstruction* given = is_exact ? nullptr : reconstruction;
+    BoundRule rule;
+    if (grid_)
+      rule.interpolant.emplace(*grid_, embedding, named.rule, given);
+    else
+      rule.interpolant.emplace(mesh_, embedding, named.rule, given);
+    rule.is_exact = is_exact;
+    rule.facts = std::move(facts);
     rule.facts.interpolant = named.name;
     if (named.rule.formula == Formula::blend) rule.facts.alpha = named.rule.alpha;
-    const BindReport& report = rule.interpolant.report();
+    const BindReport& report = rule.interpolant->report();
     rule.facts.skipped_cells = report.num_cells - report.num_active_cells;
     rule.facts.skipped_vertices = report.num_vertices - report.num_active_vertices;
     if (!is_exact && (reconstruction == nullptr || !reconstruction->blend))
-      rule.facts.max_abs_sum = greatest_absolute_sum(rule.interpolant.matrix());
+      rule.facts.max_abs_sum = greatest_absolute_sum(rule.interpolant->matrix());
+    rules_.push_back(std::move(rule));
+  }
+
+  // No cells are searched, and gradients are part of the weights: all of bind is "reconstruct".
+  void add_scattered(const ConfiguredInterpolant& named, ResultRow facts, const MadeReconstructor* made) {
+    BoundRule rule;
+    rule.facts = std::move(facts);
+    rule.facts.interpolant = named.name;
+    nlohmann::json own = nlohmann::json::parse(named.options);
+    if (made != nullptr) own.update(nlohmann::json::parse(made->options));
+    rule.facts.options = own.dump();
+    rule.facts.locate_seconds = 0;
+    rule.facts.reconstruct_seconds = median_seconds(config_.repetitions, [&] {
+      rule.scattered.emplace(mesh_, cloud_.positions, *named.scattered,
+                             made == nullptr ? nullptr : made->reconstructor.get());
+    });
+    rule.facts.max_abs_sum = greatest_absolute_sum(rule.scattered->matrix());
     rules_.push_back(std::move(rule));
   }
 
@@ -251,10 +354,15 @@ class LevelRun {
   ResultRow measure(const BoundRule& rule, int frame, const Points& values, const Points& truth, Points& result) const {
     ResultRow row = rule.facts;
     row.frame = frame;
-    const Interpolant<double>& interpolant = rule.interpolant;
+    if (rule.scattered) {
+      row.evaluate_seconds = median_seconds(config_.repetitions, [&] { result = rule.scattered->evaluate(values); });
+      row.error = region_errors(result, truth, places_);
+      return row;
+    }
+    const Interpolant<double>& interpolant = *rule.interpolant;
     Points gradients, hessians;
     if (rule.is_exact) {
-      exact_derivatives(*config_.field, mesh_, interpolant.active(), gradients, hessians);
+      exact_derivatives(*config_.fields[frame], mesh_, interpolant.active(), gradients, hessians);
     } else if (interpolant.rule().needs_gradients()) {
       row.gradients_seconds = median_seconds(config_.repetitions, [&] {
         gradients = interpolant.vertex_gradients(values);
@@ -270,24 +378,11 @@ class LevelRun {
     return row;
   }
 
-  static void add_gains(std::vector<ResultRow>& rows, std::size_t first) {
-    const auto linear = std::find_if(rows.begin() + static_cast<std::ptrdiff_t>(first), rows.end(),
-                                     [](const ResultRow& row) { return row.interpolant == "linear"; });
-    if (linear == rows.end()) return;
-    const std::array<RegionError, 3> reference = linear->error;
-    for (std::size_t r = first; r < rows.size(); ++r)
-      for (int region = 0; region < 3; ++region) {
-        const RegionError& error = rows[r].error[region];
-        if (reference[region].rms > 0 && error.rms > 0)
-          rows[r].gain_over_linear[region] = reference[region].rms / error.rms;
-        if (reference[region].max > 0 && error.max > 0)
-          rows[r].max_gain_over_linear[region] = reference[region].max / error.max;
-      }
-  }
-
   const ExperimentConfig& config_;
   int level_;
   std::function<void(std::string_view, double)> progress_;
+  std::optional<HeldOutMesh> held_out_;
+  std::optional<Grid> grid_;  // binds where there is one; its explicit mesh only places points and measures
   Mesh mesh_;
   PointCloud cloud_;
   std::vector<PointPlace> places_;
@@ -298,24 +393,74 @@ bool wants(const ExperimentConfig& config, OutputKind kind) {
   return std::find(config.outputs.begin(), config.outputs.end(), kind) != config.outputs.end();
 }
 
+/// report.html, and scene.json where there is a level to show, so that `halfgrad report` can show the run beside
+/// others.
+void write_html(const std::filesystem::path& directory, ExperimentResult& result) {
+  std::string page;
+  if (report_script().empty()) {
+    page = results_html(result.name, {&result, 1});
+  } else {
+    const ReportedRun run{results_json(result), result.scene};
+    page = interactive_html(result.name, {&run, 1});
+    if (!result.scene.empty()) write_report(directory / "scene.json", result.scene, result.files);
+  }
+  write_report(directory / "report.html", page, result.files);
+}
+
+/// The rows of all folds, pooled.
+std::vector<ResultRow> run_folds(const ExperimentConfig& config, const RunOptions& options) {
+  const Mesh mesh = config.mesh.make(0);
+  std::vector<ResultRow> rows;
+  for (int fold = 0; fold < config.num_folds; ++fold) {
+    const auto progress = [&](std::string_view stage, double fraction) {
+      if (options.progress) options.progress(stage, (fold + fraction) / config.num_folds);
+    };
+    HeldOutMesh held_out = hold_out(mesh, config.seed + static_cast<std::uint64_t>(fold));
+    LevelOutputs none;
+    const std::vector<ResultRow> more = LevelRun(config, mesh, std::move(held_out), progress).run(none);
+    if (fold == 0)
+      rows = more;
+    else
+      pool_fold(rows, more);
+  }
+  // Rows of a frame stand together.
+  for (std::size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
+    while (end < rows.size() && rows[end].frame == rows[begin].frame) ++end;
+    add_gains(std::span(rows).subspan(begin, end - begin));
+  }
+  return rows;
+}
+
 }  // namespace
 
 ExperimentResult run_experiment(const std::filesystem::path& path, const RunOptions& options) {
-  const ExperimentConfig config = read_experiment_config(path, options.overrides, options.reduced);
+  const ExperimentConfig config =
+      read_experiment_config(path, options.overrides, options.reduced, options.reconstructors);
   ExperimentResult result;
   result.name = config.name;
   result.config = config.resolved;
   if (options.check_only) return result;
 
-  const int num_levels = config.mesh.num_levels;
   LevelPicture picture;
+  if (config.num_folds > 0) {
+    result.rows = run_folds(config, options);
+    result.recommendation = recommend(result.rows);
+  }
+  const int num_levels = config.num_folds > 0 ? 0 : config.mesh.num_levels;
   for (int level = 0; level < num_levels; ++level) {
     const auto progress = [&](std::string_view stage, double fraction) {
       if (options.progress) options.progress(stage, (level + fraction) / num_levels);
     };
-    const bool pictured = level == num_levels - 1 && wants(config, OutputKind::vtu);
+    LevelOutputs outputs;
+    if (level == num_levels - 1) {
+      if (wants(config, OutputKind::vtu)) outputs.picture = &picture;
+      if (wants(config, OutputKind::html) && !report_script().empty()) outputs.scene = &result.scene;
+      if (wants(config, OutputKind::sequence) && !options.out_directory.empty())
+        outputs.sequence_folder = options.out_directory / "sequence";
+    }
     LevelRun run(config, level, progress);
-    const std::vector<ResultRow> rows = run.run(pictured ? &picture : nullptr);
+    const std::vector<ResultRow> rows = run.run(outputs);
+    result.files.insert(result.files.end(), outputs.files.begin(), outputs.files.end());
     result.rows.insert(result.rows.end(), rows.begin(), rows.end());
   }
   result.machine = machine_facts();
@@ -323,11 +468,10 @@ ExperimentResult run_experiment(const std::filesystem::path& path, const RunOpti
   result.expectations = check_expectations(config.expectations, result.rows, result.orders);
   if (!options.out_directory.empty()) {
     std::filesystem::create_directories(options.out_directory);
-    if (wants(config, OutputKind::vtu)) write_pictures(options.out_directory, picture, result.files);
+    if (wants(config, OutputKind::vtu) && num_levels > 0) write_pictures(options.out_directory, picture, result.files);
     if (wants(config, OutputKind::csv))
       write_report(options.out_directory / "results.csv", results_csv(result), result.files);
-    if (wants(config, OutputKind::html))
-      write_report(options.out_directory / "report.html", results_html(result), result.files);
+    if (wants(config, OutputKind::html)) write_html(options.out_directory, result);
     if (wants(config, OutputKind::json))
       write_report(options.out_directory / "results.json", results_json(result), result.files);
   }

@@ -3,11 +3,13 @@
 
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "experiments/results.hpp"
+#include "reconstruction/registry.hpp"
 
 namespace halfgrad {
 
@@ -16,6 +18,7 @@ struct RunOptions {
   std::vector<std::string> overrides = {};   ///< "/json/pointer=VALUE", VALUE as JSON or, where it is none, as a string
   bool reduced = false;                      ///< apply the configuration's "reduced" object first
   bool check_only = false;                   ///< read and validate; the result has a name and a config only
+  std::span<const ReconstructorEntry> reconstructors = {};  ///< of the caller's own, besides the registry's
   std::function<void(std::string_view stage, double fraction)> progress = {};  ///< called from the running thread
 };
 

@@ -1,10 +1,10 @@
 #include "experiments/experiment_config.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
+#include "framework/io/input_file.hpp"
 #include "framework/json_reader.hpp"
 
 namespace halfgrad {
@@ -14,10 +14,9 @@ using nlohmann::json;
 namespace {
 
 json read_json_file(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file) raise("{}: cannot be read", path.string());
+  const InputFile file(path);
   try {
-    return json::parse(file);
+    return json::parse(file.bytes());
   } catch (const json::parse_error& error) {
     raise("{}: not JSON: {}", path.string(), error.what());
   }
@@ -44,43 +43,18 @@ std::vector<json> read_list(JsonReader& reader, std::string_view key, json fallb
   return {list.begin(), list.end()};
 }
 
-ConfiguredInterpolant read_interpolant(const json& specification, const std::string& pointer, json& resolved) {
-  std::string name;
-  json options = json::object();
-  if (specification.is_string()) {
-    name = specification.get<std::string>();
-  } else if (specification.is_object() && specification.size() == 1) {
-    name = specification.begin().key();
-    options = specification.begin().value();
-  } else {
-    raise("{}: found {}, expected an interpolant's name or {{\"name\": {{options}}}}", pointer, specification.dump());
-  }
-  std::vector<std::string_view> names;
-  for (const NamedRule& known : named_rules()) names.push_back(known.name);
-  if (std::find(names.begin(), names.end(), name) == names.end()) {
-    const std::string nearest = nearest_name(name, names);
-    raise("{}: no interpolant \"{}\"; known: {}{}", pointer, name, join_names(names),
-          nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
-  }
-  ConfiguredInterpolant interpolant{name, named_rule(name)};
-  JsonReader reader(options, pointer + "/" + name);
-  if (name == "vertex_blend") interpolant.rule.alpha = reader.number("alpha", interpolant.rule.alpha);
-  reader.finish();
-  resolved = reader.resolved().empty() ? json(name) : json{{name, reader.resolved()}};
-  return interpolant;
-}
-
 /// The registry's reconstructors, and `exact`, which takes the field itself.
-MadeReconstructor read_reconstructor(const json& specification, const std::string& pointer, bool has_field) {
+MadeReconstructor read_reconstructor(const json& specification, const std::string& pointer, bool has_field,
+                                     std::span<const ReconstructorEntry> further) {
   const bool is_exact = specification == "exact" ||
                         (specification.is_object() && specification.size() == 1 && specification.contains("exact"));
-  if (!is_exact) return make_reconstructor(specification, pointer);
+  if (!is_exact) return make_reconstructor(specification, pointer, further);
   if (specification.is_object()) JsonReader(specification["exact"], pointer + "/exact").finish();
   if (!has_field) raise("{}: exact gradients need an analytic field, but the frames come from files", pointer);
   return {"exact", "{}", nullptr};
 }
 
-FrameFiles read_frame_files(const json& specification, const std::string& pointer, int num_levels,
+FrameFiles read_frame_files(const json& specification, const std::string& pointer, int num_levels, bool with_truth,
                             const std::filesystem::path& directory, json& resolved) {
   JsonReader reader(specification, pointer);
   FrameFiles files;
@@ -88,7 +62,7 @@ FrameFiles read_frame_files(const json& specification, const std::string& pointe
   if (static_cast<int>(files.frames.size()) != num_levels)
     raise("{}: found {} files, expected one for each of the {} meshes", reader.pointer_to("frames"),
           files.frames.size(), num_levels);
-  files.truth = directory / reader.text("truth");
+  if (with_truth) files.truth = directory / reader.text("truth");
   if (const json* select = reader.find("select")) {
     const auto whole = [](const json& entry) { return entry.is_number_integer(); };
     if (!select->is_array() || select->empty() || !std::all_of(select->begin(), select->end(), whole))
@@ -100,8 +74,31 @@ FrameFiles read_frame_files(const json& specification, const std::string& pointe
   return files;
 }
 
+/// The field frame by frame, one of its numbers growing in equal steps from zero (left out) to its value.
+std::vector<std::unique_ptr<Field>> read_sequence(const json& specification, const json& field,
+                                                  const FieldSetting& setting, json& resolved) {
+  JsonReader reader(specification, "/sequence");
+  const std::int64_t frames = reader.integer("frames", 8);
+  if (frames < 1 || frames > 10000) raise("/sequence/frames: found {}, expected 1 to 10000", frames);
+  const std::string parameter = reader.text("parameter");
+  reader.finish();
+  resolved = reader.resolved();
+  const std::string name = field.begin().key();
+  const json& options = field.begin().value();
+  const auto entry = options.find(parameter);
+  if (entry == options.end() || !entry->is_number())
+    raise("/sequence/parameter: \"{}\" is no number of the field {}: {}", parameter, name, options.dump());
+  std::vector<std::unique_ptr<Field>> fields;
+  for (std::int64_t frame = 1; frame <= frames; ++frame) {
+    json scaled = field;
+    scaled[name][parameter] = entry->get<double>() * static_cast<double>(frame) / static_cast<double>(frames);
+    fields.push_back(make_field(scaled, "/field", setting));
+  }
+  return fields;
+}
+
 std::vector<OutputKind> read_outputs(JsonReader& reader) {
-  constexpr std::array<std::string_view, 4> known = {"json", "csv", "html", "vtu"};
+  constexpr std::array<std::string_view, 5> known = {"json", "csv", "html", "vtu", "sequence"};
   std::vector<OutputKind> outputs;
   const std::vector<json> list = read_list(reader, "outputs", json::array({"json", "csv"}));
   for (std::size_t i = 0; i < list.size(); ++i) {
@@ -115,7 +112,23 @@ std::vector<OutputKind> read_outputs(JsonReader& reader) {
   return outputs;
 }
 
-ExperimentConfig read_config(const json& document, const std::filesystem::path& directory, const std::string& stem) {
+/// The number of folds of "hold_out", 0 where it is absent.
+int read_folds(JsonReader& reader, const MeshSource& mesh) {
+  const json* specification = reader.find("hold_out");
+  if (specification == nullptr) return 0;
+  if (reader.has("points"))
+    raise("/points: with \"hold_out\" the points are vertices of the mesh; leave one of them out");
+  if (mesh.num_levels != 1) raise("/hold_out: found {} levels of the mesh, expected one", mesh.num_levels);
+  JsonReader options(*specification, "/hold_out");
+  const std::int64_t folds = options.integer("folds", 4);
+  if (folds < 1 || folds > 100) raise("/hold_out/folds: found {}, expected 1 to 100", folds);
+  options.finish();
+  reader.record("hold_out", options.resolved());
+  return static_cast<int>(folds);
+}
+
+ExperimentConfig read_config(const json& document, const std::filesystem::path& directory, const std::string& stem,
+                             std::span<const ReconstructorEntry> further) {
   JsonReader reader(document, "");
   ExperimentConfig config;
   config.name = reader.text("name", stem);
@@ -128,17 +141,27 @@ ExperimentConfig read_config(const json& document, const std::filesystem::path& 
   json resolved;
   config.mesh = read_mesh_source(reader.at("mesh"), "/mesh", directory, config.seed, resolved);
   reader.record("mesh", resolved);
-  config.points = read_point_source(reader.has("points") ? reader.at("points") : json{{"random", json::object()}},
-                                    "/points", directory, config.seed, resolved);
-  reader.record("points", resolved);
+  config.num_folds = read_folds(reader, config.mesh);
+  if (config.num_folds == 0) {
+    config.points = read_point_source(reader.has("points") ? reader.at("points") : json{{"random", json::object()}},
+                                      "/points", directory, config.seed, resolved);
+    reader.record("points", resolved);
+  }
 
   const json& field = reader.at("field");
   if (field.is_object() && (field.contains("frames") || field.contains("truth"))) {
-    config.files = read_frame_files(field, "/field", config.mesh.num_levels, directory, resolved);
+    config.files =
+        read_frame_files(field, "/field", config.mesh.num_levels, config.num_folds == 0, directory, resolved);
   } else {
     // Only the file knows the dimension of a mesh that is read.
     if (config.mesh.gdim == 0) config.mesh.gdim = config.mesh.make(0).gdim();
-    config.field = make_field(field, "/field", {config.mesh.gdim, config.seed}, &resolved);
+    const FieldSetting setting{config.mesh.gdim, config.seed};
+    config.fields.push_back(make_field(field, "/field", setting, &resolved));
+    if (const json* sequence = reader.find("sequence")) {
+      json filled;
+      config.fields = read_sequence(*sequence, resolved, setting, filled);
+      reader.record("sequence", filled);
+    }
   }
   reader.record("field", resolved);
 
@@ -151,7 +174,7 @@ ExperimentConfig read_config(const json& document, const std::filesystem::path& 
   filled.clear();
   for (const json& entry : read_list(reader, "reconstructors", json::array({"chandrashekar_garg"}))) {
     config.reconstructors.push_back(
-        read_reconstructor(entry, fmt::format("/reconstructors/{}", filled.size()), config.field != nullptr));
+        read_reconstructor(entry, fmt::format("/reconstructors/{}", filled.size()), !config.fields.empty(), further));
     const MadeReconstructor& made = config.reconstructors.back();
     filled.push_back(json{{made.name, json::parse(made.options)}});
   }
@@ -180,7 +203,7 @@ ExperimentConfig read_config(const json& document, const std::filesystem::path& 
 }  // namespace
 
 ExperimentConfig read_experiment_config(const std::filesystem::path& path, const std::vector<std::string>& overrides,
-                                        bool reduced) {
+                                        bool reduced, std::span<const ReconstructorEntry> reconstructors) {
   json document = read_json_file(path);
   if (reduced && document.is_object() && document.contains("reduced")) {
     const json changes = document["reduced"];
@@ -189,7 +212,7 @@ ExperimentConfig read_experiment_config(const std::filesystem::path& path, const
   }
   for (const std::string& text : overrides) apply_override(document, text);
   try {
-    return read_config(document, path.parent_path(), path.stem().string());
+    return read_config(document, path.parent_path(), path.stem().string(), reconstructors);
   } catch (const Error& error) {
     raise("{}: {}", path.string(), error.what());
   }

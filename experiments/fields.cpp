@@ -1,5 +1,6 @@
 #include "experiments/fields.hpp"
 
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 #include "experiments/jet.hpp"
@@ -319,6 +320,53 @@ std::unique_ptr<Field> make_kelvinlet_pinch(JsonReader& options, const FieldSett
   return make_kelvinlet_in<3>(options);
 }
 
+/// A rotation about `center` on the side of a plane that its normal points to, the identity on the other: continuous at
+/// the center (and on the axis) alone, for meshes whose parts meet there.
+class RigidParts final : public Field {
+ public:
+  RigidParts(Vector center, Vector normal, SmallMatrix rotation)
+      : center_(std::move(center)), normal_(std::move(normal)), rotation_(std::move(rotation)) {}
+
+  Vector value(const Vector& position) const override { return center_ + gradient(position) * (position - center_); }
+  FieldJet jet(const Vector& position) const override {
+    const auto gdim = center_.size();
+    FieldJet result{value(position), gradient(position), {}};
+    for (Eigen::Index c = 0; c < gdim; ++c) result.hessian[c] = SmallMatrix::Zero(gdim, gdim);
+    return result;
+  }
+
+ private:
+  SmallMatrix gradient(const Vector& position) const {
+    if (normal_.dot(position - center_) > 0) return rotation_;
+    return SmallMatrix::Identity(center_.size(), center_.size());
+  }
+
+  Vector center_, normal_;
+  SmallMatrix rotation_;
+};
+
+std::unique_ptr<Field> make_rigid_parts(JsonReader& options, const FieldSetting& setting) {
+  need_plane_or_space(options, setting.gdim);
+  const int gdim = setting.gdim;
+  const auto vector = [&](std::string_view key, std::vector<double> fallback) -> Vector {
+    const std::vector<double> entries = numbers(options, key, std::move(fallback));
+    return Eigen::Map<const Eigen::VectorXd>(entries.data(), gdim);
+  };
+  std::vector<double> zero(gdim, 0.0), last = zero;
+  last.back() = 1;
+  const double angle = options.number("angle", 1.5707963267948966);
+  const Vector center = vector("center", zero), normal = vector("normal", last);
+  SmallMatrix rotation = SmallMatrix::Identity(gdim, gdim);
+  if (gdim == 2) {
+    rotation << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+  } else {
+    const Eigen::Vector3d axis = vector("axis", last).head<3>();
+    if (!(axis.norm() > 0)) raise("{}: expected a vector that is not zero", options.pointer_to("axis"));
+    rotation = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+  }
+  return std::make_unique<RigidParts>(center, normal, rotation);
+}
+
 }  // namespace
 
 std::span<const FieldEntry> field_registry() {
@@ -330,6 +378,7 @@ std::span<const FieldEntry> field_registry() {
       FieldEntry{"waves", "sine waves along and across the axes", make_waves},
       FieldEntry{"kelvinlet_pinch", "incompressible regularized pinch, De Goes & James 2017, Eq. 17",
                  make_kelvinlet_pinch},
+      FieldEntry{"rigid_parts", "a rotation on one side of a plane, identity on the other", make_rigid_parts},
   };
   return entries;
 }

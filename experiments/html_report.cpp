@@ -196,9 +196,7 @@ std::string expectation_list(const ExperimentResult& result) {
   return html + "</ul>";
 }
 
-}  // namespace
-
-std::string results_html(const ExperimentResult& result) {
+std::string result_section(const ExperimentResult& result) {
   const Styles styles(result);
   const ResultRow last = result.rows.empty() ? ResultRow() : result.rows.back();
   std::vector<const ResultRow*> finest, last_frame, last_level;
@@ -209,10 +207,7 @@ std::string results_html(const ExperimentResult& result) {
   }
   const nlohmann::json config = nlohmann::json::parse(result.config), machine = nlohmann::json::parse(result.machine);
 
-  std::string html = fmt::format(
-      "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><meta name='viewport' "
-      "content='width=device-width'><title>{0}</title><style>{1}</style></head><body><h1>{0}</h1>",
-      escaped(result.name), style_sheet);
+  std::string html = fmt::format("<h1>{}</h1>", escaped(result.name));
   if (config.contains("description"))
     html += fmt::format("<p>{}</p>", escaped(config["description"].get<std::string>()));
   html +=
@@ -231,6 +226,20 @@ std::string results_html(const ExperimentResult& result) {
   if (!result.expectations.empty()) html += expectation_list(result);
   html += fmt::format("<h2>Configuration</h2><details><summary>with all defaults</summary><pre>{}</pre></details>",
                       escaped(config.dump(2)));
+  return html;
+}
+
+}  // namespace
+
+std::string results_html(const std::string& title, std::span<const ExperimentResult> results) {
+  std::string html = fmt::format(
+      "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><meta name='viewport' "
+      "content='width=device-width'><title>{}</title><style>{}</style></head><body>",
+      escaped(title), style_sheet);
+  for (const ExperimentResult& result : results) html += result_section(result);
+  html +=
+      "<p class='facts'>Charts without script: this halfgrad was built without npm. With npm, the page is interactive "
+      "and shows the points in 3D.</p>";
   return html + "</body></html>\n";
 }
 

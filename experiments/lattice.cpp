@@ -24,9 +24,10 @@ struct Builder {
 };
 
 /// Corners of a grid of boxes, the first axis fastest.
-class Grid {
+class Corners {
  public:
-  Grid(Builder& builder, std::array<int, 3> n, int dim) : n_(n) {
+  explicit Corners(std::array<int, 3> n) : n_(n) {}
+  Corners(Builder& builder, std::array<int, 3> n, int dim) : n_(n) {
     for (int k = 0; k <= (dim == 3 ? n[2] : 0); ++k)
       for (int j = 0; j <= n[1]; ++j)
         for (int i = 0; i <= n[0]; ++i)
@@ -51,14 +52,14 @@ void segments(Builder& builder, std::array<int, 3> n) {
 }
 
 void quadrilaterals(Builder& builder, std::array<int, 3> n) {
-  const Grid at(builder, n, 2);
+  const Corners at(builder, n, 2);
   for_each_box(n, 2, [&](int i, int j, int) {
     builder.cells.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
   });
 }
 
 void hexahedra(Builder& builder, std::array<int, 3> n) {
-  const Grid at(builder, n, 3);
+  const Corners at(builder, n, 3);
   for_each_box(n, 3, [&](int i, int j, int k) {
     builder.cells.push_back({at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k), at(i, j, k + 1),
                              at(i + 1, j, k + 1), at(i + 1, j + 1, k + 1), at(i, j + 1, k + 1)});
@@ -67,7 +68,7 @@ void hexahedra(Builder& builder, std::array<int, 3> n) {
 
 /// All squares cut along the same diagonal.
 void kuhn_triangles(Builder& builder, std::array<int, 3> n) {
-  const Grid at(builder, n, 2);
+  const Corners at(builder, n, 2);
   for_each_box(n, 2, [&](int i, int j, int) {
     builder.cells.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
     builder.cells.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
@@ -76,7 +77,7 @@ void kuhn_triangles(Builder& builder, std::array<int, 3> n) {
 
 /// Diagonals that alternate like a chessboard.
 void union_jack_triangles(Builder& builder, std::array<int, 3> n) {
-  const Grid at(builder, n, 2);
+  const Corners at(builder, n, 2);
   for_each_box(n, 2, [&](int i, int j, int) {
     const Index a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
     if ((i + j) % 2 == 0) {
@@ -116,7 +117,7 @@ void equilateral_triangles(Builder& builder, std::array<int, 3> n) {
 
 /// Six tetrahedra around the diagonal of each box: point-symmetric stars inside.
 void kuhn_tetrahedra(Builder& builder, std::array<int, 3> n) {
-  const Grid at(builder, n, 3);
+  const Corners at(builder, n, 3);
   constexpr int orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
   for_each_box(n, 3, [&](int i, int j, int k) {
     for (int p = 0; p < 6; ++p) {
@@ -133,7 +134,7 @@ void kuhn_tetrahedra(Builder& builder, std::array<int, 3> n) {
 
 /// Five tetrahedra a box, one in the middle; neighbouring boxes are mirror images.
 void five_tetrahedra(Builder& builder, std::array<int, 3> n) {
-  const Grid at(builder, n, 3);
+  const Corners at(builder, n, 3);
   for_each_box(n, 3, [&](int i, int j, int k) {
     const Index v[8] = {at(i, j, k),     at(i + 1, j, k),     at(i, j + 1, k),     at(i + 1, j + 1, k),
                         at(i, j, k + 1), at(i + 1, j, k + 1), at(i, j + 1, k + 1), at(i + 1, j + 1, k + 1)};
@@ -155,7 +156,7 @@ void five_tetrahedra(Builder& builder, std::array<int, 3> n) {
 
 /// Body-centered: four tetrahedra around each line between neighbouring centers; half octahedra close the sides.
 void bcc_tetrahedra(Builder& builder, std::array<int, 3> n) {
-  const Grid at(builder, n, 3);
+  const Corners at(builder, n, 3);
   const Index first_center = static_cast<Index>(builder.positions.size());
   for_each_box(n, 3, [&](int i, int j, int k) { builder.add((i + 0.5) / n[0], (j + 0.5) / n[1], (k + 0.5) / n[2]); });
   const auto center = [&](const std::array<int, 3>& box) {
@@ -192,7 +193,7 @@ void bcc_tetrahedra(Builder& builder, std::array<int, 3> n) {
 
 /// Two wedges a box, upright on Kuhn's triangles.
 void wedges(Builder& builder, std::array<int, 3> n) {
-  const Grid at(builder, n, 3);
+  const Corners at(builder, n, 3);
   for_each_box(n, 3, [&](int i, int j, int k) {
     builder.cells.push_back({at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j, k + 1), at(i + 1, j, k + 1),
                              at(i + 1, j + 1, k + 1)});
@@ -201,47 +202,118 @@ void wedges(Builder& builder, std::array<int, 3> n) {
   });
 }
 
+/// A side of a box, counter-clockwise seen from its center; the first and third corner are the least and the greatest.
+std::array<Index, 4> box_side(const Corners& at, const std::array<int, 3>& box, int axis, int side) {
+  const int b = (axis + 1 + side) % 3, c = (axis + 2 - side) % 3;
+  std::array<Index, 4> square;
+  for (int corner = 0; corner < 4; ++corner) {
+    std::array<int, 3> place = box;
+    place[axis] += side;
+    place[b] += corner == 1 || corner == 2;
+    place[c] += corner >= 2;
+    square[corner] = at(place[0], place[1], place[2]);
+  }
+  return square;
+}
+
 /// Six pyramids around the center of each box.
 void pyramids(Builder& builder, std::array<int, 3> n) {
-  const Grid at(builder, n, 3);
+  const Corners at(builder, n, 3);
   for_each_box(n, 3, [&](int i, int j, int k) {
     const Index center = builder.add((i + 0.5) / n[0], (j + 0.5) / n[1], (k + 0.5) / n[2]);
     for (int axis = 0; axis < 3; ++axis)
       for (int side = 0; side < 2; ++side) {
-        // The base, counter-clockwise seen from the center.
-        const int b = (axis + 1 + side) % 3, c = (axis + 2 - side) % 3;
-        std::vector<Index> cell;
-        for (int corner = 0; corner < 4; ++corner) {
-          std::array<int, 3> place{i, j, k};
-          place[axis] += side;
-          place[b] += corner == 1 || corner == 2;
-          place[c] += corner >= 2;
-          cell.push_back(at(place[0], place[1], place[2]));
-        }
-        cell.push_back(center);
-        builder.cells.push_back(std::move(cell));
+        const auto square = box_side(at, {i, j, k}, axis, side);
+        builder.cells.push_back({square[0], square[1], square[2], square[3], center});
       }
   });
 }
 
-/// One way to mesh a box.
+/// Like a chessboard: hexahedra, pairs of wedges and Kuhn's tetrahedra in turn on the white boxes; on the black ones a
+/// pyramid or, where the white neighbour's side is cut, two tetrahedra between each side and the center.
+void mixed_solid(Builder& builder, std::array<int, 3> n) {
+  enum Kind { center, hexahedron, wedge, tetrahedron };
+  const auto kind = [](const std::array<int, 3>& box) {
+    if ((box[0] + box[1] + box[2]) % 2 == 0) return center;
+    return static_cast<Kind>(hexahedron + (box[0] + 3 * box[1] + 5 * box[2]) / 2 % 3);
+  };
+  Builder whole;
+  hexahedra(whole, n);
+  builder.positions = whole.positions;
+  Builder cut;
+  wedges(cut, n);
+  Builder simplices;
+  kuhn_tetrahedra(simplices, n);
+  const Corners at(n);
+  std::size_t box = 0;
+  for_each_box(n, 3, [&](int i, int j, int k) {
+    switch (kind({i, j, k})) {
+      case hexahedron:
+        builder.cells.push_back(whole.cells[box]);
+        break;
+      case wedge:
+        for (std::size_t c = 0; c < 2; ++c) builder.cells.push_back(cut.cells[2 * box + c]);
+        break;
+      case tetrahedron:
+        for (std::size_t c = 0; c < 6; ++c) builder.cells.push_back(simplices.cells[6 * box + c]);
+        break;
+      case center: {
+        const Index middle = builder.add((i + 0.5) / n[0], (j + 0.5) / n[1], (k + 0.5) / n[2]);
+        for (int axis = 0; axis < 3; ++axis)
+          for (int side = 0; side < 2; ++side) {
+            const auto square = box_side(at, {i, j, k}, axis, side);
+            std::array<int, 3> beside{i, j, k};
+            beside[axis] += side == 0 ? -1 : 1;
+            const bool outside = beside[axis] < 0 || beside[axis] >= n[axis];
+            const Kind other = outside ? hexahedron : kind(beside);
+            if (other == tetrahedron || (other == wedge && axis == 2)) {
+              builder.cells.push_back({square[0], square[1], square[2], middle});
+              builder.cells.push_back({square[0], square[2], square[3], middle});
+            } else {
+              builder.cells.push_back({square[0], square[1], square[2], square[3], middle});
+            }
+          }
+      }
+    }
+    ++box;
+  });
+}
+
+/// Quadrilaterals and pairs of triangles like a chessboard.
+void mixed_plane(Builder& builder, std::array<int, 3> n) {
+  const Corners at(builder, n, 2);
+  for_each_box(n, 2, [&](int i, int j, int) {
+    const Index a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
+    if ((i + j) % 2 == 0) {
+      builder.cells.push_back({a, b, c, d});
+    } else {
+      builder.cells.push_back({a, b, c});
+      builder.cells.push_back({a, c, d});
+    }
+  });
+}
+
+/// One way to mesh a box. The elements of a mixed one are told by their number of nodes.
 struct Pattern {
   std::string_view element, name;
+  int dim;
   void (*build)(Builder&, std::array<int, 3>);
 };
 
 constexpr std::array patterns = {
-    Pattern{"segment", "", segments},
-    Pattern{"triangle", "kuhn", kuhn_triangles},
-    Pattern{"triangle", "union_jack", union_jack_triangles},
-    Pattern{"triangle", "equilateral", equilateral_triangles},
-    Pattern{"quadrilateral", "", quadrilaterals},
-    Pattern{"tetrahedron", "kuhn", kuhn_tetrahedra},
-    Pattern{"tetrahedron", "five", five_tetrahedra},
-    Pattern{"tetrahedron", "bcc", bcc_tetrahedra},
-    Pattern{"hexahedron", "", hexahedra},
-    Pattern{"wedge", "", wedges},
-    Pattern{"pyramid", "", pyramids},
+    Pattern{"segment", "", 1, segments},
+    Pattern{"triangle", "kuhn", 2, kuhn_triangles},
+    Pattern{"triangle", "union_jack", 2, union_jack_triangles},
+    Pattern{"triangle", "equilateral", 2, equilateral_triangles},
+    Pattern{"quadrilateral", "", 2, quadrilaterals},
+    Pattern{"tetrahedron", "kuhn", 3, kuhn_tetrahedra},
+    Pattern{"tetrahedron", "five", 3, five_tetrahedra},
+    Pattern{"tetrahedron", "bcc", 3, bcc_tetrahedra},
+    Pattern{"hexahedron", "", 3, hexahedra},
+    Pattern{"wedge", "", 3, wedges},
+    Pattern{"pyramid", "", 3, pyramids},
+    Pattern{"mixed", "solid", 3, mixed_solid},
+    Pattern{"mixed", "plane", 2, mixed_plane},
 };
 
 const Pattern& find_pattern(const LatticeOptions& options) {
@@ -272,14 +344,13 @@ std::vector<std::string_view> lattice_patterns(std::string_view element) {
   return names;
 }
 
+int lattice_dim(const LatticeOptions& options) { return find_pattern(options).dim; }
+
 Mesh make_lattice(const LatticeOptions& options) {
   const Pattern& pattern = find_pattern(options);
   if (!(options.jitter >= 0 && options.jitter < 0.5))
     raise("lattice: found jitter {}, expected 0 to less than 0.5", options.jitter);
-  int dim = 0;
-  Elements::for_each([&]<class E>() {
-    if (E::name == pattern.element) dim = E::dim;
-  });
+  const int dim = pattern.dim;
   double boxes = 1;
   for (int a = 0; a < dim; ++a) {
     if (options.cells[a] < 1) raise("lattice: found {} cells along axis {}, expected at least 1", options.cells[a], a);
@@ -308,11 +379,15 @@ Mesh make_lattice(const LatticeOptions& options) {
   }
   std::vector<AnyBlock> blocks;
   Elements::for_each([&]<class E>() {
-    if (E::name != pattern.element) return;
+    const bool mixed = pattern.element == "mixed";
+    if (E::dim != dim || (!mixed && E::name != pattern.element)) return;
     ElementBlock<E> block;
-    block.cells.resize(static_cast<Eigen::Index>(builder.cells.size()), E::num_nodes);
-    for (std::size_t c = 0; c < builder.cells.size(); ++c)
-      for (int i = 0; i < E::num_nodes; ++i) block.cells(static_cast<Eigen::Index>(c), i) = builder.cells[c][i];
+    std::vector<Index> nodes;
+    for (const std::vector<Index>& cell : builder.cells)
+      if (cell.size() == static_cast<std::size_t>(E::num_nodes)) nodes.insert(nodes.end(), cell.begin(), cell.end());
+    if (nodes.empty()) return;
+    block.cells.resize(static_cast<Eigen::Index>(nodes.size()) / E::num_nodes, E::num_nodes);
+    std::copy(nodes.begin(), nodes.end(), block.cells.data());
     // The patterns list the nodes of simplices in any order.
     if constexpr (E::affine)
       for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {

@@ -4,9 +4,12 @@
 #include <nlohmann/json.hpp>
 
 #include "experiments/ball.hpp"
+#include "experiments/grid_source.hpp"
 #include "experiments/lattice.hpp"
+#include "experiments/per_axis.hpp"
 #include "experiments/random_delaunay.hpp"
 #include "framework/error.hpp"
+#include "framework/io/formats.hpp"
 #include "framework/io/mesh_file.hpp"
 #include "framework/json_reader.hpp"
 
@@ -15,29 +18,6 @@ namespace halfgrad {
 using nlohmann::json;
 
 namespace {
-
-/// One number, or one a given axis.
-template <class Number>
-std::array<Number, 3> per_axis(JsonReader& options, std::string_view key, Number fallback, int dim) {
-  std::array<Number, 3> values;
-  values.fill(fallback);
-  const json* given = options.find(key);
-  if (given == nullptr) {
-    options.record(key, fallback);
-    return values;
-  }
-  if (given->is_array()) {
-    const bool numbers = std::all_of(given->begin(), given->end(), [](const json& entry) { return entry.is_number(); });
-    if (!numbers || static_cast<int>(given->size()) != dim)
-      raise("{}: found {}, expected a number or an array of {}", options.pointer_to(key), given->dump(), dim);
-    for (int a = 0; a < dim; ++a) values[a] = (*given)[a].get<Number>();
-  } else if constexpr (std::is_integral_v<Number>) {
-    values.fill(static_cast<Number>(options.integer(key)));
-  } else {
-    values.fill(options.number(key));
-  }
-  return values;
-}
 
 int read_refinements(JsonReader& source, double& factor) {
   const std::int64_t levels = source.integer("refinements", 1);
@@ -52,12 +32,9 @@ MeshSource lattice_source(const json& specification, const std::string& pointer,
   JsonReader reader(specification, pointer);
   LatticeOptions options;
   options.element = reader.choice("element", lattice_elements(), options.element);
-  int dim = 0;
-  Elements::for_each([&]<class E>() {
-    if (E::name == options.element) dim = E::dim;
-  });
   const std::vector<std::string_view> names = lattice_patterns(options.element);
   if (!names.empty()) options.pattern = reader.choice("pattern", names, names.front());
+  const int dim = lattice_dim(options);
   options.cells = per_axis<int>(reader, "cells", 4, dim);
   options.size = per_axis<double>(reader, "size", 1, dim);
   options.origin = per_axis<double>(reader, "origin", 0, dim);
@@ -72,6 +49,17 @@ MeshSource lattice_source(const json& specification, const std::string& pointer,
     return make_lattice(finer);
   };
   return {levels, dim, at_level};
+}
+
+/// The explicit mesh of a grid has the grid's numbers.
+MeshSource with_meshes(int levels, int gdim, std::function<Grid(int level)> make_grid) {
+  return {levels, gdim, [make_grid](int level) { return make_grid(level).mesh(); }, false, make_grid};
+}
+
+MeshSource grid_source(const json& specification, const std::string& pointer, int levels, double factor,
+                       json& resolved) {
+  const GridSource source = read_grid_source(specification, pointer, resolved);
+  return with_meshes(levels, source.gdim, [=](int level) { return source.make(std::pow(factor, level)); });
 }
 
 MeshSource ball_source(const json& specification, const std::string& pointer, int gdim, int levels, double factor,
@@ -124,9 +112,16 @@ MeshSource zoomed(const MeshSource& source, const json& specification, const std
   resolved = reader.resolved();
   if (source.num_levels != 1)
     raise("{}: found a mesh of {} levels, expected one: a zoom makes its own", pointer, source.num_levels);
+  const auto scale = [=](int level) { return std::pow(factor, -static_cast<double>(first + level)); };
+  if (source.make_grid) {
+    MeshSource levelled = with_meshes(static_cast<int>(levels), source.gdim,
+                                      [=](int level) { return scaled(source.make_grid(0), scale(level)); });
+    levelled.is_zoom = true;
+    return levelled;
+  }
   const auto at_level = [=](int level) {
     const Mesh mesh = source.make(0);
-    return Mesh(mesh.vertices() * std::pow(factor, -static_cast<double>(first + level)), mesh.blocks());
+    return Mesh(mesh.vertices() * scale(level), mesh.blocks());
   };
   return {static_cast<int>(levels), source.gdim, at_level, true};
 }
@@ -157,9 +152,13 @@ MeshSource read_mesh_source(const json& specification, const std::string& pointe
   if (const json* file = reader.find("file")) {
     ++kinds;
     const auto paths = read_paths(*file, reader.pointer_to("file"), directory);
-    source = {static_cast<int>(paths.size()), 0, [paths](int level) { return read_mesh(paths[level]); }};
+    const auto read_grid = find_format(paths[0], FormatUse::read_mesh).read_grid;
+    if (read_grid != nullptr)
+      source = with_meshes(static_cast<int>(paths.size()), 0, [=](int level) { return read_grid(paths[level]); });
+    else
+      source = {static_cast<int>(paths.size()), 0, [paths](int level) { return read_mesh(paths[level]); }};
   }
-  for (const std::string_view kind : {"lattice", "ball", "disc", "random_delaunay"}) {
+  for (const std::string_view kind : {"lattice", "ball", "disc", "random_delaunay", "grid"}) {
     const json* options = reader.find(kind);
     if (options == nullptr) continue;
     ++kinds;
@@ -169,13 +168,16 @@ MeshSource read_mesh_source(const json& specification, const std::string& pointe
     const std::string where = reader.pointer_to(kind);
     if (kind == "lattice")
       source = lattice_source(*options, where, levels, factor, seed, filled);
+    else if (kind == "grid")
+      source = grid_source(*options, where, levels, factor, filled);
     else if (kind == "random_delaunay")
       source = random_delaunay_source(*options, where, levels, factor, seed, filled);
     else
       source = ball_source(*options, where, kind == "ball" ? 3 : 2, levels, factor, seed, filled);
     reader.record(kind, filled);
   }
-  if (kinds != 1) raise("{}: found {} of lattice, ball, disc, random_delaunay, file; expected one", pointer, kinds);
+  if (kinds != 1)
+    raise("{}: found {} of lattice, ball, disc, random_delaunay, grid, file; expected one", pointer, kinds);
   if (const json* zoom = reader.find("zoom")) {
     json filled;
     source = zoomed(source, *zoom, reader.pointer_to("zoom"), filled);

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "framework/mesh.hpp"
+#include "framework/grid.hpp"
 
 namespace halfgrad {
 
@@ -16,12 +16,13 @@ struct MeshSource {
   int num_levels = 1;
   int gdim = 3;  ///< 0 where only the file knows
   std::function<Mesh(int level)> make;
-  bool is_zoom = false;  ///< the levels are one mesh at several sizes
+  bool is_zoom = false;                           ///< the levels are one mesh at several sizes
+  std::function<Grid(int level)> make_grid = {};  ///< the same levels as grids; empty where they are none
 };
 
-/// From {"lattice": {…}, "refinements": n}, {"ball": {…}}, {"disc": {…}}, {"random_delaunay": {…}}, {"file": name
-/// or list}, with "zoom": {…} shrunk level by level. Relative paths start at `directory`. `resolved` receives the
-/// object with defaults. Throws Error that names the JSON pointer.
+/// From {"lattice": {…}, "refinements": n}, {"ball": {…}}, {"disc": {…}}, {"random_delaunay": {…}}, {"grid": {…}},
+/// {"file": name or list}, with "zoom": {…} shrunk level by level. Relative paths start at `directory`. `resolved`
+/// receives the object with defaults. Throws Error that names the JSON pointer.
 MeshSource read_mesh_source(const nlohmann::json& specification, const std::string& pointer,
                             const std::filesystem::path& directory, std::uint64_t seed, nlohmann::json& resolved);
 

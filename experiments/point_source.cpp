@@ -9,6 +9,7 @@
 
 #include "experiments/mesh_source.hpp"
 #include "experiments/random.hpp"
+#include "experiments/tessellation.hpp"
 #include "framework/embedding.hpp"
 #include "framework/error.hpp"
 #include "framework/io/point_set.hpp"
@@ -196,12 +197,18 @@ PointSource cylinder_source(JsonReader& reader, const std::string& pointer, std:
   return surface(cylinder_surface(radius, height, around, along, center_of(reader)), pointer);
 }
 
+PointSource tessellation_source(JsonReader& reader, const std::string&, std::uint64_t) {
+  const int subdivisions = count_of(reader, "subdivisions", 8, 1, 1000);
+  return [subdivisions](const Mesh& mesh, int) { return tessellation(mesh, subdivisions); };
+}
+
 struct PointKind {
   std::string_view name;
   PointSource (*make)(JsonReader& reader, const std::string& pointer, std::uint64_t seed);
 };
 constexpr std::array point_kinds = {PointKind{"random", random_source}, PointKind{"grid", grid_source},
-                                    PointKind{"geodesic", geodesic_source}, PointKind{"cylinder", cylinder_source}};
+                                    PointKind{"geodesic", geodesic_source}, PointKind{"cylinder", cylinder_source},
+                                    PointKind{"tessellation", tessellation_source}};
 
 }  // namespace
 
@@ -229,7 +236,8 @@ PointSource read_point_source(const json& specification, const std::string& poin
     reader.record(kind.name, own.resolved());
   }
   reader.finish();
-  if (kinds != 1) raise("{}: found {} of random, grid, geodesic, cylinder, file; expected one", pointer, kinds);
+  if (kinds != 1)
+    raise("{}: found {} of random, grid, geodesic, cylinder, tessellation, file; expected one", pointer, kinds);
   resolved = reader.resolved();
   return source;
 }

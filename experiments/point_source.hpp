@@ -19,8 +19,8 @@ struct PointCloud {
 /// Makes the points for one level of a mesh.
 using PointSource = std::function<PointCloud(const Mesh& mesh, int level)>;
 
-/// From {"random": {…}}, {"grid": {…}}, {"geodesic": {…}}, {"cylinder": {…}} or {"file": name}. Throws Error that names
-/// the JSON pointer.
+/// From {"random": {…}}, {"grid": {…}}, {"geodesic": {…}}, {"cylinder": {…}}, {"tessellation": {…}} or {"file": name}.
+/// Throws Error that names the JSON pointer.
 PointSource read_point_source(const nlohmann::json& specification, const std::string& pointer,
                               const std::filesystem::path& directory, std::uint64_t seed, nlohmann::json& resolved);
 

@@ -27,7 +27,10 @@ json row_json(const ResultRow& row) {
   json error, gain;
   for (int r = 0; r < 3; ++r) {
     const std::string region(region_names[r]);
-    error[region] = {{"max", row.error[r].max}, {"rms", row.error[r].rms}, {"points", row.error[r].points}};
+    error[region] = {{"max", row.error[r].max},
+                     {"rms", row.error[r].rms},
+                     {"mean", row.error[r].mean},
+                     {"points", row.error[r].points}};
     gain[region] = or_null(row.gain_over_linear[r]);
   }
   return {{"level", row.level},
@@ -54,6 +57,23 @@ json row_json(const ResultRow& row) {
             {"vertices", row.skipped_vertices},
             {"linear_cells", row.linear_cells},
             {"outside_points", row.outside_points}}}};
+}
+
+json rule_json(const MeasuredRule& rule) {
+  return {{"interpolant", rule.interpolant},
+          {"reconstructor", rule.reconstructor.empty() ? json(nullptr) : json(rule.reconstructor)},
+          {"options", json::parse(rule.options.empty() ? "{}" : rule.options)},
+          {"gain_over_linear", rule.gain}};
+}
+
+json recommendation_json(const Recommendation& recommendation) {
+  json object = rule_json(recommendation.chosen);
+  object["reason"] = recommendation.reason;
+  object["points"] = recommendation.points;
+  object["frames"] = recommendation.frames;
+  object["best"] = rule_json(recommendation.best);
+  object["safe"] = recommendation.safe ? rule_json(*recommendation.safe) : json(nullptr);
+  return object;
 }
 
 /// Shortest digits that read back bit for bit.
@@ -101,13 +121,14 @@ std::string results_json(const ExperimentResult& result) {
                             {"measured", expected.measured},
                             {"matches", expected.matches},
                             {"holds", expected.holds}});
-  const json document = {{"name", result.name},
-                         {"version", version},
-                         {"config", json::parse(result.config)},
-                         {"machine", json::parse(result.machine)},
-                         {"rows", rows},
-                         {"orders", orders},
-                         {"expect", expectations}};
+  json document = {{"name", result.name},
+                   {"version", version},
+                   {"config", json::parse(result.config)},
+                   {"machine", json::parse(result.machine)},
+                   {"rows", rows},
+                   {"orders", orders},
+                   {"expect", expectations}};
+  if (result.recommendation) document["recommendation"] = recommendation_json(*result.recommendation);
   return document.dump(1) + "\n";
 }
 

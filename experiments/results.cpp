@@ -16,7 +16,7 @@ bool ExperimentResult::all_expectations_hold() const {
 std::array<RegionError, 3> region_errors(const Points& measured, const Points& truth,
                                          std::span<const PointPlace> places) {
   std::array<RegionError, 3> errors;
-  std::array<double, 3> squares{};
+  std::array<double, 3> squares{}, sums{};
   for (Eigen::Index p = 0; p < measured.rows(); ++p) {
     if (places[p] == PointPlace::nowhere) continue;
     const double error = (measured.row(p) - truth.row(p)).norm();
@@ -25,11 +25,15 @@ std::array<RegionError, 3> region_errors(const Points& measured, const Points& t
       RegionError& norms = errors[static_cast<int>(region)];
       if (!(error <= norms.max)) norms.max = error;  // NaN stays visible
       squares[static_cast<int>(region)] += error * error;
+      sums[static_cast<int>(region)] += error;
       ++norms.points;
     }
   }
   for (int r = 0; r < 3; ++r)
-    if (errors[r].points > 0) errors[r].rms = std::sqrt(squares[r] / errors[r].points);
+    if (errors[r].points > 0) {
+      errors[r].rms = std::sqrt(squares[r] / errors[r].points);
+      errors[r].mean = sums[r] / errors[r].points;
+    }
   return errors;
 }
 
@@ -83,8 +87,7 @@ std::vector<ResultOrder> orders_of(const std::vector<ResultRow>& rows) {
 }
 
 std::string rule_name(const std::string& interpolant, const std::string& reconstructor, const std::string& options) {
-  if (reconstructor.empty()) return interpolant;
-  std::string name = interpolant + " + " + reconstructor;
+  std::string name = reconstructor.empty() ? interpolant : interpolant + " + " + reconstructor;
   const nlohmann::json object = nlohmann::json::parse(options.empty() ? "{}" : options);
   std::string details;
   for (const auto& [key, value] : object.items())

@@ -16,14 +16,15 @@ namespace halfgrad {
 enum class Region : std::uint8_t { all, interior, boundary };
 inline constexpr std::array<std::string_view, 3> region_names = {"all", "interior", "boundary"};
 /// Which norm of the Euclidean errors of points.
-enum class Norm : std::uint8_t { rms, max };
-inline constexpr std::array<std::string_view, 2> norm_names = {"rms", "max"};
+enum class Norm : std::uint8_t { rms, max, mean };
+inline constexpr std::array<std::string_view, 3> norm_names = {"rms", "max", "mean"};
 
 /// Error over a region, length units.
 struct RegionError {
   double max = 0, rms = 0;
   Index points = 0;
-  double operator[](Norm norm) const { return norm == Norm::rms ? rms : max; }
+  double mean = 0;
+  double operator[](Norm norm) const { return norm == Norm::rms ? rms : norm == Norm::max ? max : mean; }
 };
 
 /// One line of results.json: a level, a frame, an interpolant and a reconstructor.
@@ -37,12 +38,14 @@ struct ResultRow {
   std::string interpolant;
   std::optional<double> alpha;  ///< of blends
   std::string reconstructor;    ///< empty where the interpolant needs none
-  std::string options;          ///< of the reconstructor, compact JSON
+  std::string options;          ///< of the reconstructor and of a baseline, compact JSON
   std::array<RegionError, 3> error;
   std::array<std::optional<double>, 3> gain_over_linear;      ///< none where linear was not run or has no error
   std::array<std::optional<double>, 3> max_gain_over_linear;  ///< the same in the max norm
   std::optional<double> max_abs_sum;  ///< greatest Σ_j |S_ij| over the points; none for data-dependent rules
-  std::optional<double> sigma;        ///< spread of cell weights, averages of cells only
+  std::optional<double> sigma;        ///< deviation of cell weights (James 2020, Fig. 6), averages of cells only
+  std::optional<double>
+      time_over_linear;  ///< a frame's gradients and points over linear's; none where linear was not run
   double locate_seconds = 0, reconstruct_seconds = 0, gradients_seconds = 0, evaluate_seconds = 0;
   Index skipped_cells = 0, skipped_vertices = 0, linear_cells = 0, outside_points = 0;
 };
@@ -69,6 +72,22 @@ struct ResultExpectation {
   bool holds = false;
 };
 
+/// A rule and what it gained over linear.
+struct MeasuredRule {
+  std::string interpolant;
+  std::string reconstructor, options;
+  double gain = 1;  ///< geometric mean over the frames
+};
+
+/// Which rule to take, and why.
+struct Recommendation {
+  MeasuredRule chosen, best;
+  std::optional<MeasuredRule> safe;  ///< phong with adaptive, where it was measured
+  Index points = 0;                  ///< held out, all folds
+  int frames = 0;                    ///< that count
+  std::string reason;
+};
+
 /// All of it.
 struct ExperimentResult {
   std::string name;
@@ -77,6 +96,8 @@ struct ExperimentResult {
   std::vector<ResultRow> rows;
   std::vector<ResultOrder> orders;
   std::vector<ResultExpectation> expectations;
+  std::optional<Recommendation> recommendation;  ///< of runs that hold out vertices
+  std::string scene;               ///< of the finest level for the interactive report, JSON; empty where not asked for
   std::vector<std::string> files;  ///< written
 
   bool all_expectations_hold() const;

@@ -8,6 +8,26 @@ namespace {
 
 std::string gain_text(const std::optional<double>& gain) { return gain ? fmt::format("{:.3g}", *gain) : "-"; }
 
+std::string gain_of(const MeasuredRule& rule) {
+  return fmt::format("{} {:.3g}", rule_name(rule.interpolant, rule.reconstructor, rule.options), rule.gain);
+}
+
+std::string recommendation_text(const Recommendation& recommendation) {
+  const MeasuredRule& chosen = recommendation.chosen;
+  std::string text =
+      fmt::format("recommended: {} ({})\n  gains over linear on {} vertices held out, {} frames: best {}",
+                  rule_name(chosen.interpolant, chosen.reconstructor, chosen.options), recommendation.reason,
+                  recommendation.points, recommendation.frames, gain_of(recommendation.best));
+  if (recommendation.safe) text += fmt::format(", safe {}", gain_of(*recommendation.safe));
+  text += fmt::format("\n  halfgrad deform --interpolant {}", chosen.interpolant);
+  if (!chosen.reconstructor.empty())
+    text +=
+        fmt::format(" --reconstructor '{}'", chosen.options == "{}" || chosen.options.empty()
+                                                 ? chosen.reconstructor
+                                                 : fmt::format("{{\"{}\":{}}}", chosen.reconstructor, chosen.options));
+  return text + " ...\n";
+}
+
 }  // namespace
 
 std::string summary_table(const ExperimentResult& result) {
@@ -45,6 +65,7 @@ std::string summary_table(const ExperimentResult& result) {
     }
     text += '\n';
   }
+  if (result.recommendation) text += recommendation_text(*result.recommendation);
   const auto held = std::count_if(result.expectations.begin(), result.expectations.end(),
                                   [](const ResultExpectation& expected) { return expected.holds; });
   if (!result.expectations.empty()) text += fmt::format("expect: {} of {} hold\n", held, result.expectations.size());

@@ -10,8 +10,10 @@ namespace halfgrad {
 /// A side of a cell.
 struct CellFacet {
   Index cell;
-  int facet;  ///< position in the element's facets
+  int facet;  ///< position in the element's facets, or whole_cell
 };
+/// As a side: the cell of a surface itself.
+inline constexpr int whole_cell = -1;
 
 /// The facets of exactly one cell, where cells marked in `skip` (#cells) count as absent; ascending by cell and facet.
 std::vector<CellFacet> boundary_facets(const Mesh& mesh, const std::vector<char>& skip);

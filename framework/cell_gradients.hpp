@@ -1,9 +1,12 @@
 // What reconstructors see of a mesh: incidence, centroids and one linear gradient stencil a cell, no elements.
 #pragma once
 
+#include <Eigen/LU>
+#include <cmath>
 #include <span>
 #include <vector>
 
+#include "framework/cell_extent.hpp"
 #include "framework/mesh.hpp"
 
 namespace halfgrad {
@@ -15,19 +18,51 @@ struct CellGradient {
   NodeRows weights;   ///< #nodes × gdim: F_C = Σ_i x_i ⊗ weights.row(i), rows sum to zero
 };
 
+/// Cells as numbers, of whatever elements: what reconstructors need of cells that no Mesh holds.
+struct CellTable {
+  Points vertices;                      ///< rest positions, #vertices × gdim
+  IndexTable cells;                     ///< the vertices of each cell
+  std::vector<CellGradient> gradients;  ///< one a cell
+  std::vector<char> boundary;           ///< one a vertex, 1 on a facet of one cell only
+};
+
+/// Geometry of one cell of type E by its node positions.
+template <Element E>
+CellGradient cell_gradient(const NodeMatrix<E>& positions) {
+  const NodeMatrix<E> derivative = E::shape_gradient(E::center());
+  CellGradient result;
+  // Differences to the first node keep the digits of cells far from the origin.
+  const NodeMatrix<E> edges = positions.rowwise() - positions.row(0);
+  result.centroid = (edges.transpose() * E::shape(E::center())) + positions.row(0).transpose();
+  const Eigen::Matrix<double, E::dim, E::dim> jacobian = edges.transpose() * derivative;
+  const double determinant = jacobian.determinant();
+  if (is_degenerate<E>(cell_extent<E>(edges), determinant)) {
+    result.weights = NodeRows::Zero(E::num_nodes, E::dim);
+    return result;
+  }
+  result.volume = std::abs(determinant) * E::reference_volume;
+  result.weights = derivative * jacobian.inverse();
+  return result;
+}
+
 /// Incidence of a rest mesh and its cells' gradients at their centers. Cell geometry is computed on demand, so that a
 /// scene pays for the cells its stencils touch and no others. The mesh must outlive it. Thread-safe.
 class CellGradients {
  public:
+  /// Throws Error on a surface, whose gradients are fitted in tangent planes (reconstruction/surface_gradients.hpp).
   explicit CellGradients(const Mesh& mesh);
+  /// Cells whose geometry was computed elsewhere. The table must outlive it.
+  explicit CellGradients(const CellTable& table);
 
-  int gdim() const { return mesh_->gdim(); }
-  Index num_vertices() const { return mesh_->num_vertices(); }
-  Index num_cells() const { return mesh_->num_cells(); }
+  int gdim() const { return static_cast<int>(vertices_->cols()); }
+  Index num_vertices() const { return static_cast<Index>(vertices_->rows()); }
+  Index num_cells() const { return table_ != nullptr ? table_->cells.num_rows() : mesh_->num_cells(); }
   /// Rest positions, #vertices × gdim.
-  const Points& vertices() const { return mesh_->vertices(); }
+  const Points& vertices() const { return *vertices_; }
   std::span<const Index> cells_of(Index vertex) const { return vertex_cells_[vertex]; }
-  std::span<const Index> vertices_of(Index cell) const { return mesh_->cell_vertices(cell); }
+  std::span<const Index> vertices_of(Index cell) const {
+    return table_ != nullptr ? table_->cells[cell] : mesh_->cell_vertices(cell);
+  }
   bool on_boundary(Index vertex) const { return boundary_[vertex] != 0; }
   /// Centroid, volume and gradient stencil of a cell.
   CellGradient gradient(Index cell) const;
@@ -35,7 +70,9 @@ class CellGradients {
   Vector centroid(Index cell) const;
 
  private:
-  const Mesh* mesh_;
+  const Points* vertices_;
+  const Mesh* mesh_ = nullptr;
+  const CellTable* table_ = nullptr;
   IndexTable vertex_cells_;
   std::vector<char> boundary_;
 };

@@ -376,7 +376,7 @@ CellLocations locate_in(const Mesh& mesh, const Points& points, double tolerance
 
 template <int D>
 CellLocations locate_from(const Mesh& mesh, const Points& points, double tolerance) {
-  if constexpr (D < max_gdim)
+  if constexpr (D < Elements::max_dim)
     if (mesh.gdim() > D) return locate_from<D + 1>(mesh, points, tolerance);
   return locate_in<D>(mesh, points, tolerance);
 }

@@ -19,19 +19,6 @@ std::string describe(const Points& points, Index point) {
   return text + ")";
 }
 
-void check(const Mesh& mesh, const Points& points, const EmbedOptions& options) {
-  if (mesh.num_cells() == 0) raise("the mesh has no cells: no point can be embedded");
-  if (points.cols() != mesh.gdim())
-    raise("points with {} coordinates in a mesh of R^{}: expected {} coordinates", points.cols(), mesh.gdim(),
-          mesh.gdim());
-  if (points.rows() > std::numeric_limits<Index>::max())
-    raise("{} points: at most {} can be numbered", points.rows(), std::numeric_limits<Index>::max());
-  if (!(options.tolerance >= 0) || !(options.tolerance < 0.1))
-    raise("an embedding tolerance of {}: expected a number from 0 to 0.1", options.tolerance);
-  for (Index p = 0; p < points.rows(); ++p)
-    if (!points.row(p).allFinite()) raise("point {} is {}: expected finite coordinates", p, describe(points, p));
-}
-
 // The facets to which the distance of an unclaimed point counts: those of one cell, where degenerate cells are absent,
 // and all of folded cells. A position inside a folded cell whose ξ was not found is near that cell, not outside the
 // mesh by the distance to its boundary.
@@ -103,8 +90,35 @@ Nearest nearest(const Mesh& mesh, const NearestCell& search, const Vector& posit
 
 }  // namespace
 
+void check_points(const Points& points, int gdim, const EmbedOptions& options) {
+  if (points.cols() != gdim)
+    raise("points with {} coordinates in a mesh of R^{}: expected {} coordinates", points.cols(), gdim, gdim);
+  if (points.rows() > std::numeric_limits<Index>::max())
+    raise("{} points: at most {} can be numbered", points.rows(), std::numeric_limits<Index>::max());
+  if (!(options.tolerance >= 0) || !(options.tolerance < 0.1))
+    raise("an embedding tolerance of {}: expected a number from 0 to 0.1", options.tolerance);
+  for (Index p = 0; p < points.rows(); ++p)
+    if (!points.row(p).allFinite()) raise("point {} is {}: expected finite coordinates", p, describe(points, p));
+}
+
+void apply_policy(const Embedding& embedding, const Points& points, const EmbedOptions& options) {
+  if (options.outside != Outside::error || embedding.outside.empty()) return;
+  const auto farthest =
+      std::max_element(embedding.outside.begin(), embedding.outside.end(),
+                       [](const OutsidePoint& a, const OutsidePoint& b) { return a.distance < b.distance; });
+  const OutsidePoint& first = embedding.outside.front();
+  raise(
+      "{} of {} points lie outside the mesh; the first is point {} at {}, at distance {:.6g}; the farthest is point "
+      "{}, at distance {:.6g}: expected points inside, or the policy nearest (--outside nearest: the closest cell "
+      "serves them) or mark (--outside mark: their results are NaN)",
+      embedding.outside.size(), embedding.num_points(), first.point, describe(points, first.point), first.distance,
+      farthest->point, farthest->distance);
+}
+
 Embedding embed(const Mesh& mesh, const Points& points, const EmbedOptions& options) {
-  check(mesh, points, options);
+  if (mesh.num_cells() == 0) raise("the mesh has no cells: no point can be embedded");
+  if (mesh.is_surface()) raise("a surface in space holds no points: use embed_on_surface, which carries them with it");
+  check_points(points, mesh.gdim(), options);
   CellLocations locations = locate(mesh, points, options.tolerance);
   Embedding result;
   result.gdim = mesh.gdim();
@@ -143,18 +157,7 @@ Embedding embed(const Mesh& mesh, const Points& points, const EmbedOptions& opti
     result.status[p] = served ? PointStatus::outside : PointStatus::not_found;
     result.outside.push_back({p, at.distance, served ? at.offset : Vector::Zero(mesh.gdim())});
   }
-  if (options.outside == Outside::error && !result.outside.empty()) {
-    const auto farthest =
-        std::max_element(result.outside.begin(), result.outside.end(),
-                         [](const OutsidePoint& a, const OutsidePoint& b) { return a.distance < b.distance; });
-    const OutsidePoint& first = result.outside.front();
-    raise(
-        "{} of {} points lie outside the mesh; the first is point {} at {}, at distance {:.6g}; the farthest is point "
-        "{}, at distance {:.6g}: expected points inside, or the policy nearest (the closest cell serves them) or mark "
-        "(their results are NaN)",
-        result.outside.size(), result.num_points(), first.point, describe(points, first.point), first.distance,
-        farthest->point, farthest->distance);
-  }
+  apply_policy(result, points, options);
   return result;
 }
 

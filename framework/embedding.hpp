@@ -51,6 +51,12 @@ struct Embedding {
 /// Error on non-finite points, on a gdim that is not the mesh's, and as the policy says.
 Embedding embed(const Mesh& mesh, const Points& points, const EmbedOptions& options = {});
 
+/// What every embedding checks of its input: finite points (#points × gdim) and a tolerance in range; throws Error.
+void check_points(const Points& points, int gdim, const EmbedOptions& options);
+
+/// Throws Error where points lie outside and the policy refuses them.
+void apply_policy(const Embedding& embedding, const Points& points, const EmbedOptions& options);
+
 /// Weights β of a point in its cell of type E (num_nodes × 1); offset is null for points that are not outside.
 template <Element E>
 NodeVector<E> cell_weights(const ReferencePoint<E>& local, const Vector* offset) {

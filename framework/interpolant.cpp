@@ -264,7 +264,7 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
   const auto has_plain_runs = [&]<class E>(const Runs<E>& runs) {
     return !is_fast(runs) || (!E::affine && !runs.extrapolates.empty());
   };
-  bool any_fast = false, any_plain = false;
+  bool any_fast = false, any_plain = weighted.num_points() > 0;
   for (const AnyRuns& any : blocks)
     std::visit(
         [&](const auto& runs) {
@@ -326,13 +326,15 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
     for (Index run = begin; run < end; ++run)
       if (runs.extrapolates[run]) plain(run, run + 1);
   });
+  if (weighted.num_points() > 0)
+    weighted_point_stage(values, gradients != nullptr ? *gradients : none, hessians != nullptr ? *hessians : none, out);
   std::fill(out + static_cast<Offset>(num_served) * values.cols(),
             out + static_cast<Offset>(report.num_points) * values.cols(), std::numeric_limits<Scalar>::quiet_NaN());
 }
 
 template <class Scalar>
 bool Interpolant<Scalar>::Binding::all_fast(Eigen::Index columns, Kernel kernel) const {
-  if (blended || kernel != Kernel::fast || !is_fast_width(columns)) return false;
+  if (blended || weighted.num_points() > 0 || kernel != Kernel::fast || !is_fast_width(columns)) return false;
   return std::all_of(blocks.begin(), blocks.end(), [&](const AnyRuns& any) {
     return std::visit(
         [&]<class E>(const Runs<E>& runs) {

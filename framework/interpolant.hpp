@@ -13,6 +13,9 @@
 
 namespace halfgrad {
 
+class Grid;
+struct WeightedPoints;
+
 /// What bind took in and left out.
 struct BindReport {
   Index num_points = 0, num_inside = 0, num_boundary = 0, num_outside = 0, num_not_found = 0;
@@ -52,6 +55,11 @@ struct Workspace {
 /// the cells sorted in space.
 std::vector<Index> active_vertices(const Mesh& mesh, const Embedding& embedding);
 
+/// The same on a grid, by the grid's numbers.
+std::vector<Index> active_vertices(const Grid& grid, const Embedding& embedding);
+/// The vertices that points have weights on, by first use.
+std::vector<Index> active_vertices(const WeightedPoints& points);
+
 /// Points bound to a mesh under a rule. Immutable; all members const and safe to call from several threads.
 template <class Scalar = double>
 class Interpolant {
@@ -60,6 +68,12 @@ class Interpolant {
   /// gradients the caller supplies. Throws Error where the rule lacks what it needs.
   Interpolant(const Mesh& mesh, const Embedding& embedding, const InterpolationRule& rule,
               const Reconstruction* reconstruction);
+  /// The same on a grid: an explicit mesh of the cells that hold points and no others is made meanwhile.
+  Interpolant(const Grid& grid, const Embedding& embedding, const InterpolationRule& rule,
+              const Reconstruction* reconstruction);
+  /// Points by their weights, on the plain path: they are evaluated in full whatever the tolerance, and gradient()
+  /// throws Error, since weights alone do not tell their own gradients.
+  Interpolant(const WeightedPoints& points, const InterpolationRule& rule, const Reconstruction* reconstruction);
   ~Interpolant();
   Interpolant(Interpolant&&) noexcept;
   Interpolant& operator=(Interpolant&&) noexcept;
@@ -101,7 +115,7 @@ class Interpolant {
                       Values<Scalar>& out, const EvaluateOptions& options = {}) const;
 
   /// Gradient of the interpolated field at the points (James 2020, Eq. 15, for the rule at hand), #points × (#columns ·
-  /// gdim): discontinuous across facets.
+  /// gdim): discontinuous across facets. Throws Error where the points were given by their weights.
   Values<Scalar> gradient(const Values<Scalar>& values) const;
   /// Σ β_i F_i: a continuous gradient, less accurate inside good cells, better on slivers.
   Values<Scalar> smooth_gradient(const Values<Scalar>& values) const;
@@ -114,6 +128,10 @@ class Interpolant {
 
  private:
   struct Binding;
+  // A mesh that is part of a larger one: `numbers` are its vertices' there.
+  Interpolant(const Mesh& mesh, const Embedding& embedding, const InterpolationRule& rule,
+              const Reconstruction* reconstruction, std::span<const Index> numbers, Index num_vertices,
+              Index num_cells);
   std::unique_ptr<const Binding> binding_;
 };
 

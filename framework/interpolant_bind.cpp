@@ -1,6 +1,7 @@
 // Bind: points sorted by cell, cells along a curve, vertices by first use, stencils in that numbering.
 #include <numeric>
 
+#include "framework/grid.hpp"
 #include "framework/interpolant_binding.hpp"
 
 namespace halfgrad {
@@ -79,6 +80,13 @@ std::vector<Index> vertices_by_first_use(const Mesh& mesh, const CellOrder& orde
 
 std::vector<Index> active_vertices(const Mesh& mesh, const Embedding& embedding) {
   return vertices_by_first_use(mesh, order_cells(mesh, embedding));
+}
+
+std::vector<Index> active_vertices(const Grid& grid, const Embedding& embedding) {
+  const GridPart part = active_part(grid, embedding);
+  std::vector<Index> active = active_vertices(part.mesh, part.embedding);
+  for (Index& vertex : active) vertex = part.vertices[vertex];
+  return active;
 }
 
 namespace {
@@ -240,8 +248,59 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
 }  // namespace
 
 template <class Scalar>
+void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstruction, std::vector<Index>& number) {
+  // α = 0 takes no gradients even where they are offered.
+  if (!rule.needs_gradients() || reconstruction == nullptr) return;
+  const GradientStencilTable& table = reconstruction->stencils;
+  if (table.gdim != gdim) raise("stencils of dimension {} for a mesh of {}", table.gdim, gdim);
+  if (rule.needs_hessians() && !table.has_hessians() && table.num_rows() > 0)
+    raise("dual_taylor needs vertex Hessians: use the reconstructor {{\"kriging\": {{\"drift\": \"cubic\"}}}}");
+  has_gradients = true;
+  if (reconstruction->blend)
+    blended = select_rows(*reconstruction, vertices);
+  else
+    pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
+  report.num_stencil_entries = blended ? table.num_entries() : static_cast<Offset>(stencils.neighbors.size());
+}
+
+template <class Scalar>
+void Interpolant<Scalar>::Binding::count_bytes() {
+  const auto bytes = [](const auto& vector) { return static_cast<Offset>(vector.capacity() * sizeof(vector[0])); };
+  for (const auto& any : blocks)
+    std::visit(
+        [&](const auto& runs) {
+          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.first_chunk) +
+                          bytes(runs.chunks) + bytes(runs.affine) + bytes(runs.local) + bytes(runs.offset) +
+                          bytes(runs.offsets) + bytes(runs.extrapolates);
+        },
+        any);
+  report.bytes += bytes(weighted.first) + bytes(weighted.nodes) + bytes(weighted.coefficients) + bytes(weighted.beta);
+  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position) + bytes(stencils.offsets) +
+                  bytes(stencils.neighbors) + bytes(stencils.weights);
+  if (blended)
+    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging})
+      report.bytes += bytes(table->offsets) + bytes(table->neighbors) + bytes(table->weights);
+}
+
+template <class Scalar>
 Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, const InterpolationRule& rule,
+                                 const Reconstruction* reconstruction)
+    : Interpolant(mesh, embedding, rule, reconstruction, {}, mesh.num_vertices(), mesh.num_cells()) {}
+
+template <class Scalar>
+Interpolant<Scalar>::Interpolant(const Grid& grid, const Embedding& embedding, const InterpolationRule& rule,
                                  const Reconstruction* reconstruction) {
+  if (embedding.gdim != grid.gdim())
+    raise("points embedded in {} dimensions, but the grid has {}", embedding.gdim, grid.gdim());
+  const GridPart part = active_part(grid, embedding);
+  *this = Interpolant(part.mesh, part.embedding, rule, reconstruction, part.vertices, grid.num_vertices(),
+                      grid.num_cells());
+}
+
+template <class Scalar>
+Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, const InterpolationRule& rule,
+                                 const Reconstruction* reconstruction, std::span<const Index> numbers,
+                                 Index num_vertices, Index num_cells) {
   if (embedding.gdim != mesh.gdim())
     raise("points embedded in {} dimensions, but the mesh has {}", embedding.gdim, mesh.gdim());
   auto binding = std::make_unique<Binding>();
@@ -250,8 +309,16 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
   const CellOrder order = order_cells(mesh, embedding);
   binding->vertices = vertices_by_first_use(mesh, order);
   binding->num_active = static_cast<Index>(binding->vertices.size());
-  std::vector<Index> number(static_cast<std::size_t>(mesh.num_vertices()), -1);
-  for (std::size_t a = 0; a < binding->vertices.size(); ++a) number[binding->vertices[a]] = static_cast<Index>(a);
+  std::vector<Index> number(static_cast<std::size_t>(num_vertices), -1), part_number;
+  if (!numbers.empty()) part_number.assign(numbers.size(), -1);
+  for (std::size_t a = 0; a < binding->vertices.size(); ++a) {
+    Index& vertex = binding->vertices[a];
+    if (!numbers.empty()) {
+      part_number[vertex] = static_cast<Index>(a);
+      vertex = numbers[vertex];
+    }
+    number[vertex] = static_cast<Index>(a);
+  }
 
   const std::vector<Index> outside_row = outside_rows(embedding);
   binding->permutation.resize(embedding.cells.size());
@@ -268,7 +335,7 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
     using Runs = typename Binding::template Runs<E>;
     Runs runs;
     runs.base = base;
-    pack_runs<Runs, Scalar>(mesh, embedding, order, members, number, outside_row, runs,
+    pack_runs<Runs, Scalar>(mesh, embedding, order, members, numbers.empty() ? number : part_number, outside_row, runs,
                             binding->permutation.data() + base);
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));
@@ -280,40 +347,13 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
 
   BindReport& report = binding->report;
   count_points(embedding, report);
-  report.num_cells = mesh.num_cells();
+  report.num_cells = num_cells;
   report.num_active_cells = static_cast<Index>(order.cells.size());
-  report.num_vertices = mesh.num_vertices();
+  report.num_vertices = num_vertices;
   report.num_active_vertices = binding->num_active;
 
-  // α = 0 takes no gradients even where they are offered.
-  if (rule.needs_gradients() && reconstruction != nullptr) {
-    const GradientStencilTable& table = reconstruction->stencils;
-    if (table.gdim != mesh.gdim()) raise("stencils of dimension {} for a mesh of {}", table.gdim, mesh.gdim());
-    if (rule.needs_hessians() && !table.has_hessians() && table.num_rows() > 0)
-      raise("dual_taylor needs vertex Hessians: use the reconstructor kriging with \"drift\": \"cubic\"");
-    binding->has_gradients = true;
-    if (reconstruction->blend)
-      binding->blended = select_rows(*reconstruction, binding->vertices);
-    else
-      pack_stencils(table, rule.needs_hessians(), binding->num_active, binding->vertices, number, binding->stencils);
-    report.num_stencil_entries =
-        binding->blended ? table.num_entries() : static_cast<Offset>(binding->stencils.neighbors.size());
-  }
-  const auto bytes = [](const auto& vector) { return static_cast<Offset>(vector.capacity() * sizeof(vector[0])); };
-  for (const auto& any : binding->blocks)
-    std::visit(
-        [&](const auto& runs) {
-          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.first_chunk) +
-                          bytes(runs.chunks) + bytes(runs.affine) + bytes(runs.local) + bytes(runs.offset) +
-                          bytes(runs.offsets) + bytes(runs.extrapolates);
-        },
-        any);
-  report.bytes += bytes(binding->vertices) + bytes(binding->permutation) + bytes(binding->position) +
-                  bytes(binding->stencils.offsets) + bytes(binding->stencils.neighbors) +
-                  bytes(binding->stencils.weights);
-  if (binding->blended)
-    for (const GradientStencilTable* table : {&binding->blended->stencils, &binding->blended->blend->averaging})
-      report.bytes += bytes(table->offsets) + bytes(table->neighbors) + bytes(table->weights);
+  binding->take_gradients(reconstruction, number);
+  binding->count_bytes();
   binding_ = std::move(binding);
 }
 
@@ -321,5 +361,20 @@ template Interpolant<float>::Interpolant(const Mesh&, const Embedding&, const In
                                          const Reconstruction*);
 template Interpolant<double>::Interpolant(const Mesh&, const Embedding&, const InterpolationRule&,
                                           const Reconstruction*);
+template Interpolant<float>::Interpolant(const Grid&, const Embedding&, const InterpolationRule&,
+                                         const Reconstruction*);
+template Interpolant<double>::Interpolant(const Grid&, const Embedding&, const InterpolationRule&,
+                                          const Reconstruction*);
+// The one that both end in.
+template Interpolant<float>::Interpolant(const Mesh&, const Embedding&, const InterpolationRule&, const Reconstruction*,
+                                         std::span<const Index>, Index, Index);
+template Interpolant<double>::Interpolant(const Mesh&, const Embedding&, const InterpolationRule&,
+                                          const Reconstruction*, std::span<const Index>, Index, Index);
+
+// Weighted points are bound in a file of their own.
+template void Interpolant<float>::Binding::take_gradients(const Reconstruction*, std::vector<Index>&);
+template void Interpolant<double>::Binding::take_gradients(const Reconstruction*, std::vector<Index>&);
+template void Interpolant<float>::Binding::count_bytes();
+template void Interpolant<double>::Binding::count_bytes();
 
 }  // namespace halfgrad

@@ -74,6 +74,15 @@ struct Interpolant<Scalar>::Binding {
     std::vector<Scalar> weights;
   };
 
+  // Points given by their weights: what a point reads of each vertex, a | c_1 … c_d | (q_11 …), and β apart.
+  struct Weighted {
+    std::vector<Offset> first{0};  // [point]
+    std::vector<Index> nodes;
+    std::vector<Scalar> coefficients, beta;
+
+    Index num_points() const { return static_cast<Index>(first.size() - 1); }
+  };
+
   InterpolationRule rule;
   BindReport report;
   int gdim = 0;
@@ -81,6 +90,7 @@ struct Interpolant<Scalar>::Binding {
   Index num_served = 0;         // points with a cell
   std::vector<Index> vertices;  // the mesh's number of each vertex: active ones first, then those that stencils read
   std::vector<AnyRuns> blocks;
+  Weighted weighted;               // instead of blocks
   std::vector<Index> permutation;  // the caller's point at each sorted position, those not found last
   std::vector<Index> position;     // its inverse; empty where the orders are the same
   bool has_gradients = false;
@@ -153,6 +163,21 @@ struct Interpolant<Scalar>::Binding {
   void plain_point_stage(const Runs<E>& runs, Index begin, Index end, const Values<Scalar>& values,
                          const Values<Scalar>& gradients, const Values<Scalar>& hessians, double tolerance,
                          Scalar* out) const;
+
+  void weighted_point_stage(const Values<Scalar>& values, const Values<Scalar>& gradients,
+                            const Values<Scalar>& hessians, Scalar* out) const;
+  // Adds β-weighted rows of vertex data (#active × #columns) to `out`.
+  void add_weighted_means(const Values<Scalar>& vertex_data, Values<Scalar>& out) const;
+
+  // The row of a point in the map as a matrix: one node's part.
+  using Entries = std::vector<Eigen::Triplet<double>>;
+  void add_entries(Index point, Index node, double a, const double* c, const double* q, Entries& entries) const;
+  void add_weighted_entries(Entries& entries) const;
+
+  // The end of bind: the rows of the active vertices, and sums for the report. `number` is the binding's number of each
+  // of the caller's vertices, −1 where it has none yet.
+  void take_gradients(const Reconstruction* reconstruction, std::vector<Index>& number);
+  void count_bytes();
 
   // Both stages into `out`, #points × #columns in sorted order. Gradients come from the stencils where null.
   void frame(const Values<Scalar>& values, const Values<Scalar>* gradients, const Values<Scalar>* hessians,

@@ -10,6 +10,8 @@ template <class Scalar>
 Values<Scalar> Interpolant<Scalar>::gradient(const Values<Scalar>& values) const {
   const Binding& binding = *binding_;
   binding.require_values(values);
+  if (binding.weighted.num_points() > 0)
+    raise("the gradient of the interpolant at points given by their weights is not known: use smooth_gradient");
   const bool with_gradients = binding.rule.needs_gradients();
   const bool with_hessians = binding.rule.needs_hessians();
   const Values<Scalar> gradients = with_gradients ? vertex_gradients(values) : Values<Scalar>();
@@ -92,7 +94,26 @@ Values<Scalar> Interpolant<Scalar>::smooth_gradient(const Values<Scalar>& values
           row += static_cast<Scalar>(weights[i]) * gradients.row(runs.nodes[run][i]);
       }
   });
+  if (binding.weighted.num_points() > 0) binding.add_weighted_means(gradients, out);
   return out;
+}
+
+template <class Scalar>
+void Interpolant<Scalar>::Binding::add_entries(Index point, Index node, double a, const double* c, const double* q,
+                                               Entries& entries) const {
+  const int width = num_stencil_weights();
+  double own = a;
+  if (rule.needs_gradients())
+    for (Offset e = stencils.offsets[node]; e < stencils.offsets[node + 1]; ++e) {
+      double weight = 0;
+      for (int k = 0; k < gdim; ++k) weight += c[k] * static_cast<double>(stencils.weights[e * width + k]);
+      if (rule.needs_hessians())
+        for (int k = 0; k < num_symmetric(gdim); ++k)
+          weight += q[k] * static_cast<double>(stencils.weights[e * width + gdim + k]);
+      entries.emplace_back(point, vertices[stencils.neighbors[e]], weight);
+      own -= weight;
+    }
+  entries.emplace_back(point, vertices[node], own);
 }
 
 template <class Scalar>
@@ -100,14 +121,12 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> Interpolant<Scalar>::matrix() const
   const Binding& binding = *binding_;
   if (binding.rule.needs_gradients()) binding.require_gradients();
   if (binding.blended) raise("adaptive gradients depend on the data: there is no matrix of the map");
-  const auto& table = binding.stencils;
-  const int width = binding.num_stencil_weights();
-  std::vector<Eigen::Triplet<double>> entries;
+  typename Binding::Entries entries;
   for (const auto& any : binding.blocks)
     std::visit(
         [&]<class AnyElementRuns>(const AnyElementRuns& runs) {
           using E = typename AnyElementRuns::element;
-          constexpr int n = E::num_nodes, d = E::dim, sym = num_symmetric(d);
+          constexpr int n = E::num_nodes, d = E::dim;
           for (Index run = 0; run < runs.num_runs(); ++run)
             for (Index p = runs.first[run]; p < runs.first[run + 1]; ++p) {
               const NodeVector<E> weights = runs.beta(run, p);
@@ -118,31 +137,22 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> Interpolant<Scalar>::matrix() const
                 for (int k = 0; k < d; ++k) rest[i][k] = runs.rest[run][i][k];
               }
               const auto coefficients = kernels::point_coefficients<double, double, n, d>(binding.rule, beta, rest);
-              for (int i = 0; i < n; ++i) {
-                const Index node = runs.nodes[run][i];
-                double own = coefficients.a[i];
-                if (binding.rule.needs_gradients())
-                  for (Offset e = table.offsets[node]; e < table.offsets[node + 1]; ++e) {
-                    double weight = 0;
-                    for (int k = 0; k < d; ++k)
-                      weight += coefficients.c[i][k] * static_cast<double>(table.weights[e * width + k]);
-                    if (binding.rule.needs_hessians())
-                      for (int k = 0; k < sym; ++k)
-                        weight += coefficients.q[i][k] * static_cast<double>(table.weights[e * width + d + k]);
-                    entries.emplace_back(binding.permutation[runs.base + p], binding.vertices[table.neighbors[e]],
-                                         weight);
-                    own -= weight;
-                  }
-                entries.emplace_back(binding.permutation[runs.base + p], binding.vertices[node], own);
-              }
+              for (int i = 0; i < n; ++i)
+                binding.add_entries(binding.permutation[runs.base + p], runs.nodes[run][i], coefficients.a[i],
+                                    coefficients.c[i].data(), coefficients.q[i].data(), entries);
             }
         },
         any);
+  binding.add_weighted_entries(entries);
   Eigen::SparseMatrix<double, Eigen::RowMajor> matrix(num_points(), num_vertices());
   matrix.setFromTriplets(entries.begin(), entries.end());
   return matrix;
 }
 
+template void Interpolant<float>::Binding::add_entries(Index, Index, double, const double*, const double*,
+                                                       Entries&) const;
+template void Interpolant<double>::Binding::add_entries(Index, Index, double, const double*, const double*,
+                                                        Entries&) const;
 template Values<float> Interpolant<float>::gradient(const Values<float>&) const;
 template Values<double> Interpolant<double>::gradient(const Values<double>&) const;
 template Values<float> Interpolant<float>::smooth_gradient(const Values<float>&) const;

@@ -8,34 +8,31 @@
 
 #include "framework/cell_extent.hpp"
 #include "framework/error.hpp"
+#include "framework/tangent_plane.hpp"
 
 namespace halfgrad {
 
 namespace {
 
-// A facet by its vertices in ascending order; the orientation plays no part in counting owners.
-struct FacetKey {
-  std::array<Index, 4> vertices;
-  auto operator<=>(const FacetKey&) const = default;
-};
-
-template <Element E>
-FacetKey facet_key(const ElementBlock<E>& block, Eigen::Index row, const Facet& facet) {
-  FacetKey key;
-  key.vertices.fill(std::numeric_limits<Index>::max());
-  for (int i = 0; i < facet.num_nodes; ++i) key.vertices[i] = block.cells(row, facet.nodes[i]);
-  std::sort(key.vertices.begin(), key.vertices.end());
-  return key;
+std::vector<FacetKey> all_facets(const Mesh& mesh) {
+  std::vector<FacetKey> facets;
+  for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) { append_facets(block, facets); });
+  return facets;
 }
 
-std::vector<FacetKey> sorted_facets(const Mesh& mesh) {
-  std::vector<FacetKey> facets;
-  for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
-    for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
-      for (const Facet& facet : E::facets) facets.push_back(facet_key(block, c, facet));
-  });
-  std::sort(facets.begin(), facets.end());
-  return facets;
+// Few facets share their lowest vertex: counting brings those together, and each such group is sorted.
+std::vector<FacetKey> sorted(const std::vector<FacetKey>& facets, Index num_vertices) {
+  std::vector<Offset> next(static_cast<std::size_t>(num_vertices) + 1, 0);
+  for (const FacetKey& key : facets) ++next[key[0] + 1];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::vector<FacetKey> result(facets.size());
+  for (const FacetKey& key : facets) result[next[key[0]]++] = key;
+  // Each place has moved to the start of the next group.
+  for (Offset begin = 0; const Offset end : next) {
+    std::sort(result.begin() + begin, result.begin() + end);
+    begin = end;
+  }
+  return result;
 }
 
 // Calls f(key, count) for each distinct facet.
@@ -47,6 +44,18 @@ void for_each_facet(const std::vector<FacetKey>& sorted, Function&& f) {
     f(sorted[i], j - i);
     i = j;
   }
+}
+
+// Node positions as the inspection sees them: those of a surface's cell in the cell's own plane.
+template <Element E>
+NodeMatrix<E> inspected_positions(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row) {
+  if constexpr (E::dim == 2)
+    if (mesh.is_surface()) {
+      Eigen::Matrix<double, E::num_nodes, 3> nodes;
+      for (int i = 0; i < E::num_nodes; ++i) nodes.row(i) = mesh.vertices().row(block.cells(row, i));
+      return nodes * tangent_basis(area_vector<E::num_nodes>(nodes));
+    }
+  return node_positions(mesh, block, row);
 }
 
 // The edges of an element, read off its facets: consecutive nodes of a facet with two nodes or more.
@@ -77,8 +86,12 @@ Mesh::Mesh(Points vertices, std::vector<AnyBlock> blocks) : vertices_(std::move(
   for (const AnyBlock& any : blocks_)
     std::visit(
         [&]<Element E>(const ElementBlock<E>& block) {
-          if (E::dim != vertices_.cols())
+          const bool surface = E::dim == 2 && vertices_.cols() == 3;
+          if (E::dim != vertices_.cols() && !surface)
             raise("{} cells need vertices with {} coordinates, found {}", E::name, E::dim, vertices_.cols());
+          if (first_cell_.size() > 1 && surface != is_surface_)
+            raise("{} cells in a mesh of dimension {}", E::name, is_surface_ ? 2 : 3);
+          is_surface_ = surface;
           if (block.cells.rows() > std::numeric_limits<Index>::max() - first_cell_.back())
             raise("more than {} cells", std::numeric_limits<Index>::max());
           for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
@@ -117,6 +130,18 @@ std::string_view element_name(const Mesh& mesh, Index cell) {
                    []<Element E>(const ElementBlock<E>&, Eigen::Index) { return std::string_view(E::name); });
 }
 
+IndexTable transposed(const IndexTable& table, Index num_numbers) {
+  IndexTable result;
+  result.offsets.assign(static_cast<std::size_t>(num_numbers) + 1, 0);
+  for (Index number : table.entries) ++result.offsets[number + 1];
+  std::partial_sum(result.offsets.begin(), result.offsets.end(), result.offsets.begin());
+  result.entries.resize(result.offsets.back());
+  std::vector<Offset> next(result.offsets.begin(), result.offsets.end() - 1);
+  for (Index row = 0; row < table.num_rows(); ++row)
+    for (Index number : table[row]) result.entries[next[number]++] = row;
+  return result;
+}
+
 IndexTable vertex_cells(const Mesh& mesh) {
   IndexTable table;
   table.offsets.assign(static_cast<std::size_t>(mesh.num_vertices()) + 1, 0);
@@ -134,14 +159,18 @@ IndexTable vertex_cells(const Mesh& mesh) {
   return table;
 }
 
-std::vector<char> boundary_vertices(const Mesh& mesh) {
-  std::vector<char> boundary(mesh.num_vertices(), 0);
-  for_each_facet(sorted_facets(mesh), [&](const FacetKey& key, std::size_t count) {
+std::vector<char> boundary_vertices(std::vector<FacetKey> facets, Index num_vertices) {
+  std::vector<char> boundary(num_vertices, 0);
+  for_each_facet(sorted(facets, num_vertices), [&](const FacetKey& key, std::size_t count) {
     if (count == 2) return;
-    for (Index v : key.vertices)
+    for (Index v : key)
       if (v != std::numeric_limits<Index>::max()) boundary[v] = 1;
   });
   return boundary;
+}
+
+std::vector<char> boundary_vertices(const Mesh& mesh) {
+  return boundary_vertices(all_facets(mesh), mesh.num_vertices());
 }
 
 MeshReport inspect(const Mesh& mesh) {
@@ -154,7 +183,7 @@ MeshReport inspect(const Mesh& mesh) {
     static const auto edges = local_edges<E>();
     const auto reference = E::nodes();
     for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
-      const auto positions = node_positions(mesh, block, c);
+      const NodeMatrix<E> positions = inspected_positions(mesh, block, c);
       for (int i = 0; i < E::num_nodes; ++i) used[block.cells(c, i)] = 1;
       double longest = 0;
       for (const auto& [a, b] : edges) {
@@ -189,7 +218,7 @@ MeshReport inspect(const Mesh& mesh) {
       quality_sum += quality;
     }
   });
-  for_each_facet(sorted_facets(mesh), [&](const FacetKey&, std::size_t count) {
+  for_each_facet(sorted(all_facets(mesh), mesh.num_vertices()), [&](const FacetKey&, std::size_t count) {
     if (count == 1) ++report.num_boundary_facets;
     if (count > 2) ++report.num_nonmanifold_facets;
   });
@@ -210,8 +239,8 @@ double mean_edge_length(const Mesh& mesh) {
   for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
     static const auto edges = local_edges<E>();
     for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
-      const auto positions = node_positions(mesh, block, c);
-      for (const auto& [a, b] : edges) sum += (positions.row(a) - positions.row(b)).norm();
+      for (const auto& [a, b] : edges)
+        sum += (mesh.vertices().row(block.cells(c, a)) - mesh.vertices().row(block.cells(c, b))).norm();
       count += static_cast<Offset>(edges.size());
     }
   });

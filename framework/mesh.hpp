@@ -1,6 +1,9 @@
 // Rest vertices and homogeneous blocks of cells.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,11 +28,14 @@ using AnyBlock = Elements::apply<std::variant, ElementBlock>;
 class Mesh {
  public:
   Mesh() = default;
-  /// Takes vertices (#vertices × gdim, gdim = dim of the blocks' elements) and blocks. Throws Error on non-finite
-  /// coordinates, vertex numbers out of range, a cell that repeats a vertex, and elements whose dim is not gdim.
+  /// Takes vertices (#vertices × gdim) and blocks, whose elements all have dim = gdim, or dim = 2 in R³: a surface.
+  /// Throws Error on non-finite coordinates, vertex numbers out of range, a cell that repeats a vertex, and elements of
+  /// another dim.
   Mesh(Points vertices, std::vector<AnyBlock> blocks);
 
   int gdim() const { return static_cast<int>(vertices_.cols()); }
+  /// Whether the cells are surfaces in R³: framework/surface.hpp serves these.
+  bool is_surface() const { return is_surface_; }
   Index num_vertices() const { return static_cast<Index>(vertices_.rows()); }
   Index num_cells() const { return first_cell_.empty() ? 0 : first_cell_.back(); }
   const Points& vertices() const { return vertices_; }
@@ -45,6 +51,7 @@ class Mesh {
   Points vertices_;
   std::vector<AnyBlock> blocks_;
   std::vector<Index> first_cell_;  // #blocks + 1
+  bool is_surface_ = false;
 };
 
 /// Calls f(const ElementBlock<E>& block, Index first_cell) for each block: the one place where element types resolve.
@@ -65,7 +72,7 @@ decltype(auto) with_cell(const Mesh& mesh, Index cell, Function&& f) {
       mesh.blocks()[b]);
 }
 
-/// Rest positions of a cell's nodes, num_nodes × gdim.
+/// Rest positions of a cell's nodes, num_nodes × gdim, in a mesh that is no surface.
 template <Element E>
 Eigen::Matrix<double, E::num_nodes, E::dim> node_positions(const Mesh& mesh, const ElementBlock<E>& block,
                                                            Eigen::Index row) {
@@ -88,8 +95,30 @@ struct IndexTable {
   }
 };
 
+/// The rows that hold each number from 0 to num_numbers − 1, ascending.
+IndexTable transposed(const IndexTable& table, Index num_numbers);
+
 /// The cells at each vertex, ascending.
 IndexTable vertex_cells(const Mesh& mesh);
+
+/// A facet by its vertices in ascending order, the greatest Index where it has fewer than four.
+using FacetKey = std::array<Index, 4>;
+
+/// Appends the facets of a block, one for each cell at it.
+template <Element E>
+void append_facets(const ElementBlock<E>& block, std::vector<FacetKey>& facets) {
+  for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
+    for (const Facet& facet : E::facets) {
+      FacetKey key;
+      key.fill(std::numeric_limits<Index>::max());
+      for (int i = 0; i < facet.num_nodes; ++i) key[i] = block.cells(c, facet.nodes[i]);
+      std::sort(key.begin(), key.end());
+      facets.push_back(key);
+    }
+}
+
+/// For each vertex 1 where it lies on a facet that is listed once only (or more than twice), else 0.
+std::vector<char> boundary_vertices(std::vector<FacetKey> facets, Index num_vertices);
 
 /// For each vertex 1 where it lies on a facet that belongs to one cell only (or on a non-manifold facet), else 0.
 std::vector<char> boundary_vertices(const Mesh& mesh);
@@ -107,7 +136,7 @@ struct MeshReport {
   double min_quality = 0, mean_quality = 0;  ///< least |det J| at a node over the product of its edge lengths, 0 … 1
 };
 
-/// Inspects every cell; O(mesh).
+/// Inspects every cell; O(mesh). Cells of a surface are seen in their own plane.
 MeshReport inspect(const Mesh& mesh);
 
 /// Mean length of the edges of the cells, the h of all convergence tables.

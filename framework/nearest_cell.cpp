@@ -1,6 +1,7 @@
 #include "framework/nearest_cell.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -14,10 +15,14 @@ using FacetNodes = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 // Positions of a facet's nodes relative to `origin`, gdim × #nodes.
 FacetNodes facet_nodes(const Mesh& mesh, const CellFacet& side, const Vector& origin) {
   return with_cell(mesh, side.cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
-    const Facet& facet = E::facets[side.facet];
-    FacetNodes nodes(E::dim, facet.num_nodes);
-    for (int i = 0; i < facet.num_nodes; ++i)
-      nodes.col(i) = mesh.vertices().row(block.cells(row, facet.nodes[i])).transpose() - origin;
+    const bool whole = side.facet == whole_cell;
+    const int num_nodes = whole ? E::num_nodes : E::facets[side.facet].num_nodes;
+    assert(num_nodes <= max_facet_nodes);
+    FacetNodes nodes(mesh.gdim(), num_nodes);
+    for (int i = 0; i < num_nodes; ++i) {
+      const Index vertex = block.cells(row, whole ? i : E::facets[side.facet].nodes[i]);
+      nodes.col(i) = mesh.vertices().row(vertex).transpose() - origin;
+    }
     return nodes;
   });
 }
@@ -152,7 +157,8 @@ FacetPoint closest_in_patch(const FacetNodes& nodes) {
 }
 
 FacetPoint closest_in_facet(const FacetNodes& nodes) {
-  // A facet of a cell of R^d is a simplex where it has d nodes; the other kind is the quadrilateral face in R³.
+  // A facet of a cell of R^d is a simplex where it has d nodes, and so is a surface's cell in R³; the other kind is the
+  // quadrilateral in R³.
   if (nodes.cols() == nodes.rows()) return closest_in_simplex(nodes, (1U << nodes.cols()) - 1);
   return closest_in_patch(nodes);
 }

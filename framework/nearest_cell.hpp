@@ -14,7 +14,7 @@ struct FacetPoint {
   std::array<double, 4> weights{};  ///< one a node of the facet, ≥ 0, sum one
 };
 
-/// A tree of boxes over boundary facets. The mesh must outlive it.
+/// A tree of boxes over boundary facets, or over the cells of a surface. The mesh must outlive it.
 class NearestCell {
  public:
   struct Result {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 
 #include "elements/registry.hpp"
@@ -13,10 +14,10 @@ using Index = std::int32_t;
 /// Position in a compressed table.
 using Offset = std::int64_t;
 
-/// Greatest space dimension that the registered elements need.
-inline constexpr int max_gdim = Elements::max_dim;
-/// Greatest number of nodes of a registered element.
-inline constexpr int max_nodes = Elements::max_nodes;
+/// Greatest space dimension: that of the registered elements, and space-time (Simplex<4>).
+inline constexpr int max_gdim = std::max(Elements::max_dim, 4);
+/// Greatest number of nodes of a cell, registered or not.
+inline constexpr int max_nodes = std::max(Elements::max_nodes, 8);
 
 /// Positions, #rows × gdim, row-major, always double.
 using Points = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;

@@ -8,6 +8,8 @@
 
 namespace halfgrad {
 
+class Grid;
+
 /// Turns rest geometry into gradient stencils for the vertices asked for. Implementations use rest positions only,
 /// are deterministic for any number of threads, never fail on single cells or boundary vertices, are exact for affine
 /// values, and are invariant to numbering, rigid motion and scale.
@@ -16,6 +18,8 @@ class VertexGradientReconstructor {
   virtual ~VertexGradientReconstructor() = default;
   /// Rows for `vertices` (distinct, any order), in that order; a reconstruction with a blend may append further rows.
   virtual Reconstruction reconstruct(const CellGradients& cells, std::span<const Index> vertices) const = 0;
+  /// The same on a grid. Unless overridden it lists the grid's cells as an explicit mesh meanwhile.
+  virtual Reconstruction reconstruct_on_grid(const Grid& grid, std::span<const Index> vertices) const;
 };
 
 }  // namespace halfgrad

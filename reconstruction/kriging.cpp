@@ -31,13 +31,18 @@ constexpr std::array<PatchRule, 4> wide3 = {{{2, 32}, {3, 45}, {3, 60}, {4, 90}}
 constexpr std::array<PatchRule, 4> lean1 = {{{1, all}, {2, 4}, {3, 6}, {4, 8}}};
 constexpr std::array<PatchRule, 4> lean2 = {{{1, all}, {2, 12}, {3, 20}, {4, 28}}};
 constexpr std::array<PatchRule, 5> lean3 = {{{1, all}, {2, 32}, {3, 45}, {3, 60}, {4, 90}}};
+// Of four dimensions, with 14 linear and quadratic and 20 cubic modes: on one ring as many as in three dimensions a
+// mode. Not tuned.
+constexpr std::array<PatchRule, 3> wide4 = {{{2, 64}, {3, 90}, {4, 130}}};
+constexpr std::array<PatchRule, 4> lean4 = {{{1, all}, {2, 64}, {3, 90}, {4, 130}}};
+constexpr std::array<PatchRule, 2> cubic4 = {{{3, 160}, {4, 240}}};
 constexpr std::array<PatchRule, 3> cubic1 = {{{2, 4}, {3, 6}, {4, 8}}};
 constexpr std::array<PatchRule, 3> cubic2 = {{{3, 24}, {4, 32}, {4, 45}}};
 constexpr std::array<PatchRule, 3> cubic3 = {{{3, 60}, {4, 90}, {4, 130}}};
 
 Schedule schedule_of(const KrigingOptions& options, int gdim) {
-  static constexpr std::array<Schedule, 3> wide = {wide1, wide2, wide3}, lean = {lean1, lean2, lean3},
-                                           cubic = {cubic1, cubic2, cubic3};
+  static constexpr std::array<Schedule, 4> wide = {wide1, wide2, wide3, wide4}, lean = {lean1, lean2, lean3, lean4},
+                                           cubic = {cubic1, cubic2, cubic3, cubic4};
   if (options.drift == KrigingDrift::cubic) return cubic[gdim - 1];
   return options.patch == KrigingPatch::lean ? lean[gdim - 1] : wide[gdim - 1];
 }

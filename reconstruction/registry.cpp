@@ -6,6 +6,7 @@
 #include "framework/error.hpp"
 #include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
+#include "reconstruction/centered_difference.hpp"
 #include "reconstruction/kriging.hpp"
 #include "reconstruction/patch_recovery.hpp"
 
@@ -59,6 +60,11 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
                              kriging.patch = KrigingPatch::lean;
                            return std::make_unique<Kriging>(kriging);
                          }},
+      ReconstructorEntry{"centered_difference",
+                         "axis-aligned grids: centered inside, one-sided second order at the boundary",
+                         [](JsonReader&) -> std::unique_ptr<VertexGradientReconstructor> {
+                           return std::make_unique<CenteredDifference>();
+                         }},
       ReconstructorEntry{
           "adaptive", "blend of chandrashekar_garg and kriging, chosen by the data a vertex and frame",
           [](JsonReader&) -> std::unique_ptr<VertexGradientReconstructor> { return std::make_unique<Adaptive>(); }},
@@ -66,7 +72,8 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
   return entries;
 }
 
-MadeReconstructor make_reconstructor(const nlohmann::json& specification, const std::string& pointer) {
+MadeReconstructor make_reconstructor(const nlohmann::json& specification, const std::string& pointer,
+                                     std::span<const ReconstructorEntry> further) {
   std::string name;
   nlohmann::json options = nlohmann::json::object();
   std::string where = pointer;
@@ -81,16 +88,17 @@ MadeReconstructor make_reconstructor(const nlohmann::json& specification, const 
           pointer.empty() ? "reconstructor" : pointer, specification.dump());
   }
   std::vector<std::string_view> names;
-  for (const ReconstructorEntry& entry : reconstructor_registry()) {
-    if (entry.name == name) {
-      JsonReader reader(options, where);
-      MadeReconstructor made{name, "", entry.make(reader)};
-      reader.finish();
-      made.options = reader.resolved().dump();
-      return made;
+  for (const std::span<const ReconstructorEntry> entries : {reconstructor_registry(), further})
+    for (const ReconstructorEntry& entry : entries) {
+      if (entry.name == name) {
+        JsonReader reader(options, where);
+        MadeReconstructor made{name, "", entry.make(reader)};
+        reader.finish();
+        made.options = reader.resolved().dump();
+        return made;
+      }
+      names.push_back(entry.name);
     }
-    names.push_back(entry.name);
-  }
   const std::string nearest = nearest_name(name, names);
   raise("{}: no reconstructor \"{}\"; known: {}{}", pointer.empty() ? "reconstructor" : pointer, name,
         join_names(names), nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));

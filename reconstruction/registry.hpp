@@ -30,8 +30,9 @@ struct MadeReconstructor {
   std::unique_ptr<VertexGradientReconstructor> reconstructor;
 };
 
-/// From "name" or {"name": {options}}; `pointer` says where the specification stands. Throws Error with the known names
-/// or keys.
-MadeReconstructor make_reconstructor(const nlohmann::json& specification, const std::string& pointer = "");
+/// From "name" or {"name": {options}}; `pointer` says where the specification stands, and `further` lists
+/// reconstructors of the caller's own. Throws Error with the known names or keys.
+MadeReconstructor make_reconstructor(const nlohmann::json& specification, const std::string& pointer = "",
+                                     std::span<const ReconstructorEntry> further = {});
 
 }  // namespace halfgrad

@@ -17,7 +17,8 @@ SymmetricEigen solve(const SmallMatrix& matrix) {
 
 SymmetricEigen symmetric_eigen(const SmallMatrix& matrix) {
   if (matrix.rows() == 1) return {Vector::Constant(1, matrix(0, 0)), SmallMatrix::Identity(1, 1)};
-  return matrix.rows() == 2 ? solve<2>(matrix) : solve<3>(matrix);
+  if (matrix.rows() == 2) return solve<2>(matrix);
+  return matrix.rows() == 3 ? solve<3>(matrix) : solve<4>(matrix);
 }
 
 }  // namespace halfgrad

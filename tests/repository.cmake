@@ -30,4 +30,17 @@ add_test(NAME install_consumer
          COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/install_consumer/run.sh ${PROJECT_BINARY_DIR}
                  ${PROJECT_SOURCE_DIR}/README.md)
 
-set_tests_properties(headers_compile_alone missing_element_member_is_named install_consumer PROPERTIES LABELS build)
+# The projects below examples/, each against an installed halfgrad.
+add_test(NAME examples
+         COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/examples.sh ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR}/examples)
+
+set_tests_properties(headers_compile_alone missing_element_member_is_named install_consumer examples
+                     PROPERTIES LABELS build)
+
+# The report in a browser, where there is one.
+if(TARGET halfgrad_program AND HALFGRAD_NODE)
+  add_test(NAME report_page
+           COMMAND ${HALFGRAD_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/report_page/check.mjs $<TARGET_FILE:halfgrad_program>
+                   ${PROJECT_SOURCE_DIR}/configs/sequence_cylinder.json ${CMAKE_CURRENT_BINARY_DIR}/report_page)
+  set_tests_properties(report_page PROPERTIES SKIP_RETURN_CODE 77 LABELS build)
+endif()

@@ -13,6 +13,7 @@
 #include "framework/io/pvd.hpp"
 #include "framework/io/stl.hpp"
 #include "framework/io/tetgen.hpp"
+#include "framework/io/vtk_grid.hpp"
 #include "framework/io/vtk_legacy.hpp"
 #include "framework/io/vtk_xml.hpp"
 #include "framework/json_reader.hpp"
@@ -56,10 +57,11 @@ const std::vector<Format>& formats() {
       {"Gmsh", {".msh"}, true, read_gmsh, nullptr, nullptr},
       {"legacy VTK", {".vtk"}, true, read_vtk_legacy, nullptr, nullptr},
       {"VTK XML", {".vtu", ".vtp"}, true, read_vtk_xml, nullptr, nullptr},
+      {"VTK grid", {".vti", ".vtr"}, true, read_vtk_grid_cells, nullptr, nullptr, read_vtk_grid},
       {"MEDIT", {".mesh"}, true, read_medit, nullptr, nullptr},
       {"TetGen", {".node", ".ele"}, true, read_tetgen, nullptr, nullptr},
-      {"Wavefront OBJ", {".obj"}, false, read_obj, nullptr, create_obj_frames},
-      {"PLY", {".ply"}, false, read_ply, nullptr, nullptr},
+      {"Wavefront OBJ", {".obj"}, true, read_obj, nullptr, create_obj_frames},
+      {"PLY", {".ply"}, true, read_ply, nullptr, nullptr},
       {"STL", {".stl"}, false, read_stl, nullptr, nullptr},
       {"NumPy", {".npy"}, false, read_npy_geometry, open_npy_frames, create_npy_frames},
       {"PC2 point cache", {".pc2"}, false, nullptr, open_pc2_frames, create_pc2_frames},
@@ -81,16 +83,26 @@ const Format& find_format(const std::filesystem::path& path, FormatUse use) {
     if (named) known_as = format.name;
     if (serves(format, use)) serving.insert(serving.end(), format.extensions.begin(), format.extensions.end());
   }
+  if (std::error_code ignored; use != FormatUse::create_frames && std::filesystem::is_directory(path, ignored))
+    raise("{}: found a folder, expected a file{}", path.string(),
+          use == FormatUse::open_frames
+              ? fmt::format(" or a pattern of its files such as {}", (path / "*.vtu").string())
+              : "");
   const std::string nearest = nearest_name(extension, serving);
   const std::string found = !known_as.empty()   ? fmt::format("{} ({})", extension, known_as)
                             : extension.empty() ? "a name without extension"
                                                 : fmt::format("the unknown extension {}", extension);
-  raise("{}: found {}, but {} {}{}", path.string(), found, verb(use), join_names(serving),
-        known_as.empty() && !extension.empty() && !nearest.empty() ? fmt::format("; did you mean {}?", nearest) : "");
+  // .inp is no misspelt .vtp: only names that begin alike are taken for mistakes.
+  const bool alike = known_as.empty() && extension.size() > 1 && nearest.size() > 1 && extension[1] == nearest[1];
+  const bool foreign = known_as.empty() && !extension.empty() && !alike && use != FormatUse::create_frames;
+  raise("{}: found {}, but {} {}{}{}", path.string(), found, verb(use), join_names(serving),
+        alike ? fmt::format("; did you mean {}?", nearest) : "",
+        foreign ? "; meshio (\"meshio convert FILE out.vtu\") turns many other formats into one of them" : "");
 }
 
-std::unique_ptr<FrameSink> create_frames(const std::filesystem::path& path, const PointSet& shape) {
-  return find_format(path, FormatUse::create_frames).create_frames(path, shape);
+std::unique_ptr<FrameSink> create_frames(const std::filesystem::path& path, const PointSet& shape,
+                                         const FrameSinkOptions& options) {
+  return find_format(path, FormatUse::create_frames).create_frames(path, shape, options);
 }
 
 }  // namespace halfgrad

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "framework/grid.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
 #include "framework/io/geometry.hpp"
@@ -20,7 +21,8 @@ struct Format {
   bool has_cells;                            ///< read() gives cells that make a mesh
   Geometry (*read)(const std::filesystem::path&);
   std::unique_ptr<FrameSource> (*open_frames)(const std::filesystem::path&);
-  std::unique_ptr<FrameSink> (*create_frames)(const std::filesystem::path&, const PointSet&);
+  std::unique_ptr<FrameSink> (*create_frames)(const std::filesystem::path&, const PointSet&, const FrameSinkOptions&);
+  Grid (*read_grid)(const std::filesystem::path&) = nullptr;  ///< the cells without listing them
 };
 
 const std::vector<Format>& formats();

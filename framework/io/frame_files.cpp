@@ -14,6 +14,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// The point vector `displacement`, or null.
+const PointArray* displacement_of(const PointSet& set) {
+  const PointArray* array = find_array(set.arrays, "displacement");
+  return array != nullptr && array->values.cols() == 3 ? array : nullptr;
+}
+
 class FileFrames final : public FrameSource {
  public:
   FileFrames(const std::string& name, std::vector<fs::path> files, Points first, bool displaced)
@@ -23,6 +29,8 @@ class FileFrames final : public FrameSource {
         first_(std::move(first)),
         displaced_(displaced) {}
 
+  std::string frame_name(Index frame) const override { return files_[static_cast<std::size_t>(frame)].string(); }
+
  private:
   void fill(Index frame, Values<double>& out) override {
     const fs::path& file = files_[static_cast<std::size_t>(frame)];
@@ -31,11 +39,9 @@ class FileFrames final : public FrameSource {
       raise("{}: frame {} has {} vertices with {} coordinates, expected {} with {} as in {}", file.string(), frame,
             set.points.rows(), set.points.cols(), first_.rows(), first_.cols(), files_.front().string());
     out = std::move(set.points);
-    if (displaced_ && set.displacement.rows() == out.rows() && out == first_)
-      out += set.displacement.leftCols(out.cols());
+    if (const PointArray* moved = displacement_of(set); displaced_ && moved != nullptr && out == first_)
+      out += moved->values.leftCols(out.cols());
   }
-  std::string frame_name(Index frame) const override { return files_[static_cast<std::size_t>(frame)].string(); }
-
   std::vector<fs::path> files_;
   Points first_;
   bool displaced_;
@@ -129,8 +135,8 @@ std::vector<fs::path> globbed_files(const std::string& spec) {
 
 std::unique_ptr<FrameSource> open_frame_files(const std::string& name, std::vector<fs::path> files) {
   PointSet first = read_points(files.front());
-  const bool displaced = first.displacement.rows() == first.points.rows() &&
-                         (files.size() == 1 || read_points(files.back()).points == first.points);
+  const bool displaced =
+      displacement_of(first) != nullptr && (files.size() == 1 || read_points(files.back()).points == first.points);
   return std::make_unique<FileFrames>(name, std::move(files), std::move(first.points), displaced);
 }
 

@@ -8,15 +8,18 @@
 
 namespace halfgrad {
 
-/// A sequence of frames. Holds one frame at most, whatever the length.
+/// A sequence of frames: positions, or other values of vertices. Holds one frame at most, whatever the length.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
   Index num_frames() const { return num_frames_; }
   Index num_vertices() const { return num_vertices_; }
-  /// Coordinates of a position: 2 or 3. Files other than .npy always have 3.
+  /// Columns of a frame; of positions 2 or 3, and files other than .npy always have 3.
   int num_columns() const { return num_columns_; }
+
+  /// The file that holds a frame.
+  virtual std::string frame_name(Index) const { return name_; }
 
   /// Reads a frame into `out`, resized to #vertices × #columns. Throws Error on a frame out of range, on another number
   /// of vertices than the first frame's and on non-finite values; the message names the file, the frame and the vertex.
@@ -29,8 +32,6 @@ class FrameSource {
   /// Fills `out`, which has the right size.
   virtual void fill(Index frame, Values<double>& out) = 0;
   virtual void fill(Index frame, Values<float>& out);
-  /// The file a frame comes from, for messages.
-  virtual std::string frame_name(Index) const { return name_; }
 
  private:
   template <class Scalar>

@@ -86,6 +86,12 @@ AnyBlock build_block(const Geometry& geometry, int vtk_id, Index num_cells) {
 
 }  // namespace
 
+const PointArray* find_array(std::span<const PointArray> arrays, std::string_view name) {
+  const auto found =
+      std::find_if(arrays.begin(), arrays.end(), [&](const PointArray& array) { return array.name == name; });
+  return found == arrays.end() ? nullptr : &*found;
+}
+
 const CellType* find_cell_type(int vtk_id) {
   static const std::vector<CellType> types = cell_types();
   const auto found =
@@ -127,6 +133,11 @@ void check(const Geometry& geometry, const std::filesystem::path& path) {
 }
 
 Mesh build_mesh(Geometry geometry, const std::filesystem::path& path) {
+  // Polygons with the number of nodes of an element are that element.
+  constexpr int polygon = 7, triangle = 5, quadrilateral = 9;
+  for (Index c = 0; c < geometry.cells.num_rows(); ++c)
+    if (geometry.vtk_ids[c] == polygon && geometry.cells[c].size() <= 4 && geometry.cells[c].size() >= 3)
+      geometry.vtk_ids[c] = geometry.cells[c].size() == 3 ? triangle : quadrilateral;
   int dim = 0;
   for (int id : geometry.vtk_ids) dim = std::max(dim, find_cell_type(id)->dim);
   if (dim == 0) raise("{}: found no cells, expected a mesh", path.string());
@@ -146,13 +157,15 @@ Mesh build_mesh(Geometry geometry, const std::filesystem::path& path) {
             count, find_cell_type(id)->name, id, registered_elements());
   if (geometry.vertices.cols() < dim)
     raise("{}: cells of dimension {} on vertices with {} coordinates", path.string(), dim, geometry.vertices.cols());
-  if (const int column = varying_column(geometry.vertices, dim); column >= 0)
-    raise("{}: cells of dimension {} with varying {}: surfaces and curves in space are not supported yet",
-          path.string(), dim, column == 1 ? "y" : "z");
+  const int column = varying_column(geometry.vertices, dim);
+  if (dim == 1 && column >= 0)
+    raise("{}: cells of dimension 1 with varying {}: curves in the plane or in space are not supported", path.string(),
+          column == 1 ? "y" : "z");
+  const int gdim = column >= 0 ? 3 : dim;
   std::vector<AnyBlock> blocks;
   for (const auto& [id, count] : types) blocks.push_back(build_block(geometry, id, count));
   try {
-    return Mesh(first_columns(geometry.vertices, dim), std::move(blocks));
+    return Mesh(first_columns(geometry.vertices, gdim), std::move(blocks));
   } catch (const Error& error) {
     raise("{}: {}", path.string(), error.what());
   }
@@ -168,7 +181,7 @@ PointSet build_point_set(Geometry geometry) {
     set.faces.offsets.push_back(static_cast<Offset>(set.faces.entries.size()));
   }
   set.points = std::move(geometry.vertices);
-  set.displacement = std::move(geometry.displacement);
+  set.arrays = std::move(geometry.arrays);
   set.obj_text = std::move(geometry.obj_text);
   return set;
 }
@@ -177,6 +190,12 @@ Mesh read_mesh(const std::filesystem::path& path) {
   Geometry geometry = find_format(path, FormatUse::read_mesh).read(path);
   check(geometry, path);
   return build_mesh(std::move(geometry), path);
+}
+
+RestShape read_rest_shape(const std::filesystem::path& path) {
+  const Format& format = find_format(path, FormatUse::read_mesh);
+  if (format.read_grid != nullptr) return format.read_grid(path);
+  return read_mesh(path);
 }
 
 PointSet read_points(const std::filesystem::path& path) {

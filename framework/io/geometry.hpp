@@ -29,7 +29,7 @@ struct Geometry {
   Points vertices;           ///< #vertices × 2 or 3
   std::vector<int> vtk_ids;  ///< #cells
   IndexTable cells;          ///< #cells rows of vertex numbers
-  Values<double> displacement;
+  std::vector<PointArray> arrays;
   std::string obj_text;
 
   /// Appends a cell. Numbers out of range are left to check().

@@ -4,6 +4,7 @@
 
 #include "framework/io/cursor.hpp"
 #include "framework/io/output_file.hpp"
+#include "framework/io/unfinished_run.hpp"
 
 namespace halfgrad {
 
@@ -100,12 +101,14 @@ void copy_frame(const NpyArray& array, std::int64_t frame, Values<Scalar>& out) 
           array.at<Scalar>(array.fortran_order ? frame + frames * (v + rows * a) : (frame * rows + v) * columns + a);
 }
 
-void check_rows(const InputFile& file, const NpyArray& array, std::string_view expected) {
+// Throws unless the shape is (frames,) rows, columns with a number of columns within the bounds.
+void check_shape(const InputFile& file, const NpyArray& array, std::int64_t min_columns, std::int64_t max_columns,
+                 std::string_view expected) {
   const std::size_t d = array.shape.size();
-  const bool fits = d >= 2 && array.shape[d - 2] <= std::numeric_limits<Index>::max() &&
-                    array.shape[0] <= std::numeric_limits<Index>::max() && array.shape[0] > 0;
-  const bool wide_enough = fits && (array.shape[d - 1] == 2 || array.shape[d - 1] == 3);
-  if (!wide_enough)
+  const bool fits = (d == 2 || d == 3) && array.shape[d - 2] <= std::numeric_limits<Index>::max() &&
+                    array.shape[0] <= std::numeric_limits<Index>::max() && array.shape[0] > 0 &&
+                    array.shape[d - 1] >= min_columns && array.shape[d - 1] <= max_columns;
+  if (!fits)
     raise("{}: found an array of shape ({}), expected {}", file.path().string(), fmt::join(array.shape, ", "),
           expected);
 }
@@ -126,12 +129,13 @@ class NpyFrames final : public FrameSource {
   NpyArray array_;
 };
 
-// A header of 128 bytes for any shape, so that the number of frames can be put in at the end.
+// A header of one size for any shape, so that the number of frames can be put in at the end.
+constexpr std::size_t header_size = 128;
 std::string npy_header(bool is_double, const std::vector<std::int64_t>& shape) {
   std::string text =
       fmt::format("{{'descr': '{}f{}', 'fortran_order': False, 'shape': ({}), }}",
                   std::endian::native == std::endian::little ? '<' : '>', is_double ? 8 : 4, fmt::join(shape, ", "));
-  text.resize(117, ' ');
+  text.resize(header_size - 11, ' ');
   text += '\n';
   const std::size_t size = text.size();
   return std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(size & 255) + static_cast<char>(size >> 8) + text;
@@ -144,16 +148,14 @@ std::string_view bytes_of(const Values<Scalar>& values) {
 
 class NpySink final : public FrameSink {
  public:
-  explicit NpySink(const std::filesystem::path& path) : file_(path) {}
+  NpySink(const std::filesystem::path& path, const FrameSinkOptions& options) : file_(path, options, header_size) {}
 
   void write(const Values<double>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
   void write(const Values<float>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
 
-  void finish() override {
-    if (num_frames_ == 0) raise("{}: no frame was written", file_.path().string());
-    file_.overwrite(0, npy_header(is_double_, {num_frames_, rows_, columns_}));
-    file_.commit();
-  }
+  Index num_resumable() const override { return file_.num_resumable(); }
+  void resume(Index num_frames) override { file_.resume(num_frames); }
+  void finish() override { file_.finish(npy_header(is_double_, {file_.num_frames(), rows_, columns_})); }
 
  private:
   template <class Scalar>
@@ -161,22 +163,20 @@ class NpySink final : public FrameSink {
     const std::string name = file_.path().string();
     if (!arrays.empty()) raise("{}: .npy cannot hold the array \"{}\"", name, arrays.front().name);
     constexpr bool is_double = sizeof(Scalar) == 8;
-    if (num_frames_ == 0) {
+    if (columns_ == 0) {
       is_double_ = is_double;
       rows_ = points.rows();
       columns_ = points.cols();
-      file_.write(npy_header(is_double_, {0, rows_, columns_}));
     }
     if (points.rows() != rows_ || points.cols() != columns_ || is_double != is_double_)
-      raise("{}: frame {} is {} × {} of {} bytes, expected {} × {} of {} as the first", name, num_frames_,
+      raise("{}: frame {} is {} × {} of {} bytes, expected {} × {} of {} as the first", name, file_.num_frames(),
             points.rows(), points.cols(), sizeof(Scalar), rows_, columns_, is_double_ ? 8 : 4);
-    file_.write(bytes_of(points));
-    ++num_frames_;
+    file_.append(npy_header(is_double_, {0, rows_, columns_}), bytes_of(points));
   }
 
-  OutputFile file_;
+  SeriesFile file_;
   bool is_double_ = true;
-  std::int64_t num_frames_ = 0, rows_ = 0, columns_ = 0;
+  std::int64_t rows_ = 0, columns_ = 0;
 };
 
 template <class Scalar>
@@ -207,7 +207,7 @@ Geometry read_npy_geometry(const std::filesystem::path& path) {
   const NpyArray array = parse_npy(file);
   if (array.shape.size() != 2)
     raise("{}: found an array of shape ({}), expected #points × 2 or 3", path.string(), fmt::join(array.shape, ", "));
-  check_rows(file, array, "#points × 2 or 3");
+  check_shape(file, array, 2, 3, "#points × 2 or 3");
   Geometry geometry;
   geometry.vertices.resize(array.shape[0], array.shape[1]);
   copy_frame(array, 0, geometry.vertices);
@@ -217,15 +217,21 @@ Geometry read_npy_geometry(const std::filesystem::path& path) {
 std::unique_ptr<FrameSource> open_npy_frames(const std::filesystem::path& path) {
   auto file = std::make_unique<InputFile>(path);
   NpyArray array = parse_npy(*file);
-  if (array.shape.size() > 3)
-    raise("{}: found an array of shape ({}), expected #frames × #vertices × 2 or 3", path.string(),
-          fmt::join(array.shape, ", "));
-  check_rows(*file, array, "#frames × #vertices × 2 or 3, or #vertices × 2 or 3");
+  check_shape(*file, array, 2, 3, "#frames × #vertices × 2 or 3, or #vertices × 2 or 3");
   return std::make_unique<NpyFrames>(std::move(file), std::move(array));
 }
 
-std::unique_ptr<FrameSink> create_npy_frames(const std::filesystem::path& path, const PointSet&) {
-  return std::make_unique<NpySink>(path);
+std::unique_ptr<FrameSource> open_npy_values(const std::filesystem::path& path) {
+  auto file = std::make_unique<InputFile>(path);
+  NpyArray array = parse_npy(*file);
+  if (array.shape.size() == 1) array.shape.push_back(1);
+  check_shape(*file, array, 1, 1'000'000, "#frames × #vertices × #columns, #vertices × #columns or #vertices");
+  return std::make_unique<NpyFrames>(std::move(file), std::move(array));
+}
+
+std::unique_ptr<FrameSink> create_npy_frames(const std::filesystem::path& path, const PointSet&,
+                                             const FrameSinkOptions& options) {
+  return std::make_unique<NpySink>(path, options);
 }
 
 }  // namespace halfgrad

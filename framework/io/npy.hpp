@@ -18,7 +18,11 @@ Values<double> read_npy(const std::filesystem::path& path);
 
 /// The points of a two-dimensional array with two or three columns.
 Geometry read_npy_geometry(const std::filesystem::path& path);
+/// Values of any number of columns: #frames × #vertices × #columns, or #vertices × #columns or #vertices for one frame.
+std::unique_ptr<FrameSource> open_npy_values(const std::filesystem::path& path);
+/// Positions: the same with two or three columns.
 std::unique_ptr<FrameSource> open_npy_frames(const std::filesystem::path& path);
-std::unique_ptr<FrameSink> create_npy_frames(const std::filesystem::path& path, const PointSet& shape);
+std::unique_ptr<FrameSink> create_npy_frames(const std::filesystem::path& path, const PointSet& shape,
+                                             const FrameSinkOptions& options);
 
 }  // namespace halfgrad

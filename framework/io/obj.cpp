@@ -2,7 +2,7 @@
 
 #include "framework/io/cursor.hpp"
 #include "framework/io/frame_pattern.hpp"
-#include "framework/io/output_file.hpp"
+#include "framework/io/unfinished_run.hpp"
 
 namespace halfgrad {
 
@@ -35,16 +35,20 @@ void append_position(std::string& text, const Values<Scalar>& points, Eigen::Ind
 
 class ObjSink final : public FrameSink {
  public:
-  ObjSink(const std::filesystem::path& path, const PointSet& shape)
-      : path_(path), pattern_(FramePattern::parse(path.filename().string())), shape_(shape) {}
+  ObjSink(const std::filesystem::path& path, const PointSet& shape, const FrameSinkOptions& options)
+      : path_(path), pattern_(FramePattern::parse(path.filename().string())), shape_(shape), sequence_(path, options) {}
 
   void write(const Values<double>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
   void write(const Values<float>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
 
+  Index num_resumable() const override {
+    if (!pattern_) return 0;
+    return sequence_.num_resumable([&](std::int64_t number) { return file_name(number); });
+  }
+  void resume(Index num_frames) override { sequence_.resume(num_frames); }
   void finish() override {
-    if (files_.empty()) raise("{}: no frame was written", path_.string());
-    for (OutputFile& file : files_) file.commit();
-    files_.clear();
+    if (sequence_.num_frames() == 0) raise("{}: no frame was written", path_.string());
+    sequence_.finish();
   }
 
  private:
@@ -53,13 +57,14 @@ class ObjSink final : public FrameSink {
     if (!arrays.empty()) raise("{}: OBJ cannot hold the array \"{}\"", path_.string(), arrays.front().name);
     if (points.cols() != 2 && points.cols() != 3)
       raise("{}: found {} columns, OBJ holds 2 or 3 coordinates", path_.string(), points.cols());
-    if (!pattern_ && !files_.empty())
+    if (!pattern_ && sequence_.num_frames() > 0)
       raise("{}: a sequence needs a numbered name such as {}.%04d.obj", path_.string(), path_.stem().string());
     const std::string text = shape_.obj_text.empty() ? plain_text(points) : replaced_text(points);
-    OutputFile file(pattern_ ? path_.parent_path() / pattern_->name(static_cast<std::int64_t>(files_.size())) : path_);
-    file.write(text);
-    file.close();
-    files_.push_back(std::move(file));
+    sequence_.append(file_name(sequence_.number(sequence_.num_frames())), text);
+  }
+
+  std::filesystem::path file_name(std::int64_t number) const {
+    return pattern_ ? path_.parent_path() / pattern_->name(number) : path_;
   }
 
   template <class Scalar>
@@ -109,7 +114,7 @@ class ObjSink final : public FrameSink {
   std::filesystem::path path_;
   std::optional<FramePattern> pattern_;
   PointSet shape_;
-  std::vector<OutputFile> files_;
+  FileSequence sequence_;
 };
 
 }  // namespace
@@ -146,8 +151,9 @@ Geometry read_obj(const std::filesystem::path& path) {
   return geometry;
 }
 
-std::unique_ptr<FrameSink> create_obj_frames(const std::filesystem::path& path, const PointSet& shape) {
-  return std::make_unique<ObjSink>(path, shape);
+std::unique_ptr<FrameSink> create_obj_frames(const std::filesystem::path& path, const PointSet& shape,
+                                             const FrameSinkOptions& options) {
+  return std::make_unique<ObjSink>(path, shape, options);
 }
 
 }  // namespace halfgrad

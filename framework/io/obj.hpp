@@ -12,6 +12,7 @@ namespace halfgrad {
 Geometry read_obj(const std::filesystem::path& path);
 
 /// A sequence of files where the name has a %d, else one file. Lines of shape.obj_text other than "v" are repeated.
-std::unique_ptr<FrameSink> create_obj_frames(const std::filesystem::path& path, const PointSet& shape);
+std::unique_ptr<FrameSink> create_obj_frames(const std::filesystem::path& path, const PointSet& shape,
+                                             const FrameSinkOptions& options);
 
 }  // namespace halfgrad

@@ -12,21 +12,30 @@ namespace halfgrad {
 class OutputFile {
  public:
   explicit OutputFile(const std::filesystem::path& path);
+  /// A file that outlives its process: it is written as ".name.unfinished", which destruction leaves where it is.
+  /// Opens what an earlier process left; throws Error where another process is writing it.
+  static OutputFile open_unfinished(const std::filesystem::path& path);
   ~OutputFile();
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
+  std::int64_t size() const;
+  /// Drops all bytes from `size` on.
+  void truncate(std::int64_t size);
   void write(std::string_view bytes);
   /// Overwrites bytes written before, for headers that hold a count.
   void overwrite(std::int64_t offset, std::string_view bytes);
-  /// Ends writing without renaming, so that many files can wait for one commit.
-  void close();
   void commit();
+  /// Removes the file, unfinished as it is.
+  void discard();
 
  private:
+  OutputFile(const std::filesystem::path& path, std::filesystem::path part, int flags);
+
   std::filesystem::path path_, part_;
   int descriptor_ = -1;
+  bool outlives_ = false;
 };
 
 /// Writes a whole file at once.

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "framework/io/cursor.hpp"
-#include "framework/io/output_file.hpp"
+#include "framework/io/unfinished_run.hpp"
 
 namespace halfgrad {
 
@@ -45,25 +45,24 @@ void append_value(std::string& bytes, T value) {
 
 class Pc2Sink final : public FrameSink {
  public:
-  explicit Pc2Sink(const std::filesystem::path& path) : file_(path) {}
+  Pc2Sink(const std::filesystem::path& path, const FrameSinkOptions& options)
+      : file_(path, options, header_size), first_(options.first), step_(options.step) {}
 
   void write(const Values<double>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
   void write(const Values<float>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
 
-  void finish() override {
-    if (num_frames_ == 0) raise("{}: no frame was written", file_.path().string());
-    file_.overwrite(0, header());
-    file_.commit();
-  }
+  Index num_resumable() const override { return file_.num_resumable(); }
+  void resume(Index num_frames) override { file_.resume(num_frames); }
+  void finish() override { file_.finish(header(file_.num_frames())); }
 
  private:
-  std::string header() const {
+  std::string header(std::int32_t num_frames) const {
     std::string bytes(signature);
     append_value(bytes, std::int32_t{1});
     append_value(bytes, num_points_);
-    append_value(bytes, 0.0F);  // first frame
-    append_value(bytes, 1.0F);  // frames a sample
-    append_value(bytes, num_frames_);
+    append_value(bytes, static_cast<float>(first_));
+    append_value(bytes, static_cast<float>(step_));
+    append_value(bytes, num_frames);
     return bytes;
   }
 
@@ -73,28 +72,26 @@ class Pc2Sink final : public FrameSink {
     if (!arrays.empty()) raise("{}: PC2 cannot hold the array \"{}\"", name, arrays.front().name);
     if (points.cols() != 2 && points.cols() != 3)
       raise("{}: found {} columns, PC2 holds 2 or 3 coordinates", name, points.cols());
-    if (num_frames_ == 0) {
-      num_points_ = static_cast<std::int32_t>(points.rows());
-      file_.write(header());
-    }
+    if (num_points_ == 0) num_points_ = static_cast<std::int32_t>(points.rows());
     if (points.rows() != num_points_)
-      raise("{}: frame {} has {} points, expected {} as the first", name, num_frames_, points.rows(), num_points_);
+      raise("{}: frame {} has {} points, expected {} as the first", name, file_.num_frames(), points.rows(),
+            num_points_);
     std::string bytes;
     bytes.reserve(static_cast<std::size_t>(12 * points.rows()));
     for (Eigen::Index v = 0; v < points.rows(); ++v)
       for (int a = 0; a < 3; ++a) {
         const Scalar value = a < points.cols() ? points(v, a) : Scalar{0};
         if (std::isfinite(value) && std::abs(value) > std::numeric_limits<float>::max())
-          raise("{}: frame {}: point {} has coordinate {}, beyond the floats that PC2 holds", name, num_frames_, v,
-                value);
+          raise("{}: frame {}: point {} has coordinate {}, beyond the floats that PC2 holds", name, file_.num_frames(),
+                v, value);
         append_value(bytes, static_cast<float>(value));
       }
-    file_.write(bytes);
-    ++num_frames_;
+    file_.append(header(0), bytes);
   }
 
-  OutputFile file_;
-  std::int32_t num_points_ = 0, num_frames_ = 0;
+  SeriesFile file_;
+  std::int64_t first_, step_;
+  std::int32_t num_points_ = 0;
 };
 
 }  // namespace
@@ -118,8 +115,9 @@ std::unique_ptr<FrameSource> open_pc2_frames(const std::filesystem::path& path) 
   return std::make_unique<Pc2Frames>(std::move(file), num_frames, num_points);
 }
 
-std::unique_ptr<FrameSink> create_pc2_frames(const std::filesystem::path& path, const PointSet&) {
-  return std::make_unique<Pc2Sink>(path);
+std::unique_ptr<FrameSink> create_pc2_frames(const std::filesystem::path& path, const PointSet&,
+                                             const FrameSinkOptions& options) {
+  return std::make_unique<Pc2Sink>(path, options);
 }
 
 }  // namespace halfgrad

@@ -11,6 +11,7 @@ namespace halfgrad {
 
 std::unique_ptr<FrameSource> open_pc2_frames(const std::filesystem::path& path);
 /// Points with two coordinates get z = 0.
-std::unique_ptr<FrameSink> create_pc2_frames(const std::filesystem::path& path, const PointSet& shape);
+std::unique_ptr<FrameSink> create_pc2_frames(const std::filesystem::path& path, const PointSet& shape,
+                                             const FrameSinkOptions& options);
 
 }  // namespace halfgrad

@@ -2,18 +2,30 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "framework/mesh.hpp"
 
 namespace halfgrad {
 
+/// Named values at points or vertices, #points × #columns.
+struct PointArray {
+  std::string name;
+  Values<double> values;
+};
+
+/// The array of this name, or null.
+const PointArray* find_array(std::span<const PointArray> arrays, std::string_view name);
+
 /// Points of a file, in its order and count.
 struct PointSet {
-  Points points;                ///< #points × 2 or 3
-  IndexTable faces;             ///< polygons by point number; no rows where the file has none
-  Values<double> displacement;  ///< #points × 3, the point vector `displacement` of a VTK file; empty where absent
-  std::string obj_text;         ///< the whole text of an OBJ file, which OBJ output repeats but for its "v" lines
+  Points points;                   ///< #points × 2 or 3
+  IndexTable faces;                ///< polygons by point number; no rows where the file has none
+  std::vector<PointArray> arrays;  ///< the point data of a VTK file
+  std::string obj_text;            ///< the whole text of an OBJ file, which OBJ output repeats but for its "v" lines
 };
 
 /// Reads .obj, .ply, .stl (three points a facet, in file order), .vtk, .vtp, .vtu, .npy (#points × 2|3) and, as their

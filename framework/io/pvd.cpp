@@ -6,7 +6,7 @@
 #include "framework/error.hpp"
 #include "framework/io/cursor.hpp"
 #include "framework/io/frame_files.hpp"
-#include "framework/io/output_file.hpp"
+#include "framework/io/unfinished_run.hpp"
 #include "framework/io/vtk_output_text.hpp"
 
 namespace halfgrad {
@@ -54,45 +54,53 @@ namespace {
 
 class PvdSink final : public FrameSink {
  public:
-  PvdSink(const fs::path& path, const PointSet& shape) : file_(path), faces_(shape.faces) {}
+  PvdSink(const fs::path& path, const PointSet& shape, const FrameSinkOptions& options)
+      : file_(path), faces_(shape.faces), sequence_(path, options) {}
 
   void write(const Values<double>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
   void write(const Values<float>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
 
+  Index num_resumable() const override {
+    return sequence_.num_resumable([&](std::int64_t number) { return file_name(number); });
+  }
+  void resume(Index num_frames) override { sequence_.resume(num_frames); }
+  // The collection comes last: once it is there, all it names is.
   void finish() override {
-    if (frames_.empty()) raise("{}: no frame was written", file_.path().string());
+    if (sequence_.num_frames() == 0) raise("{}: no frame was written", file_.path().string());
     std::string text =
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
         "byte_order=\"LittleEndian\">\n<Collection>\n";
-    for (std::size_t i = 0; i < frames_.size(); ++i)
-      text += fmt::format("<DataSet timestep=\"{}\" part=\"0\" file=\"{}\"/>\n", i,
-                          xml_escaped(frames_[i].path().filename().string()));
+    for (Index i = 0; i < sequence_.num_frames(); ++i) {
+      const std::int64_t number = sequence_.number(i);
+      text += fmt::format("<DataSet timestep=\"{}\" part=\"0\" file=\"{}\"/>\n", number,
+                          xml_escaped(file_name(number).filename().string()));
+    }
     file_.write(text + "</Collection>\n</VTKFile>\n");
-    // The collection comes last: once it is there, all it names is.
-    for (OutputFile& frame : frames_) frame.commit();
     file_.commit();
-    frames_.clear();
+    sequence_.finish();
   }
 
  private:
   template <class Scalar>
   void append(const Values<Scalar>& points, std::span<const PointArray> arrays) {
-    const fs::path name = fmt::format("{}_{:04}.vtp", file_.path().stem().string(), frames_.size());
-    OutputFile frame(file_.path().parent_path() / name);
-    frame.write(vtp_text(frame.path().string(), points, faces_, arrays));
-    frame.close();
-    frames_.push_back(std::move(frame));
+    const fs::path name = file_name(sequence_.number(sequence_.num_frames()));
+    sequence_.append(name, vtp_text(name.string(), points, faces_, arrays));
+  }
+
+  fs::path file_name(std::int64_t number) const {
+    return file_.path().parent_path() / fmt::format("{}_{:04}.vtp", file_.path().stem().string(), number);
   }
 
   OutputFile file_;
-  std::vector<OutputFile> frames_;
   IndexTable faces_;
+  FileSequence sequence_;
 };
 
 }  // namespace
 
-std::unique_ptr<FrameSink> create_pvd_frames(const fs::path& path, const PointSet& shape) {
-  return std::make_unique<PvdSink>(path, shape);
+std::unique_ptr<FrameSink> create_pvd_frames(const fs::path& path, const PointSet& shape,
+                                             const FrameSinkOptions& options) {
+  return std::make_unique<PvdSink>(path, shape, options);
 }
 
 }  // namespace halfgrad

@@ -162,8 +162,8 @@ class LegacyReader {
   void add_array(const std::string& name, const std::string& type, std::int64_t num_components,
                  std::int64_t num_tuples) {
     const std::vector<double> found = values<double>(type, product(num_components, num_tuples), name);
-    if (at_points_ && name == "displacement" && num_components == 3 && num_tuples == geometry_.vertices.rows())
-      geometry_.displacement = Eigen::Map<const Points>(found.data(), num_tuples, 3);
+    if (at_points_ && num_components > 0 && num_tuples == geometry_.vertices.rows())
+      geometry_.arrays.push_back({name, Eigen::Map<const Points>(found.data(), num_tuples, num_components)});
   }
 
   void read_points() {

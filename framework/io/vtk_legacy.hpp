@@ -5,7 +5,7 @@
 
 namespace halfgrad {
 
-/// The points and cells of an unstructured grid or of poly data, and the point vector `displacement`.
+/// The points and cells of an unstructured grid or of poly data, and the data at its points.
 Geometry read_vtk_legacy(const std::filesystem::path& path);
 
 }  // namespace halfgrad

@@ -24,9 +24,27 @@ VtkCells read_cells(const VtkXmlFile& file, const std::string& name, pugi::xml_n
 
 // Appends the rows of one piece.
 void append_rows(Points& rows, const std::vector<double>& more) {
-  const auto count = static_cast<Eigen::Index>(more.size() / 3), before = rows.rows();
-  rows.conservativeResize(before + count, 3);
-  rows.bottomRows(count) = Eigen::Map<const Points>(more.data(), count, 3);
+  const Eigen::Index count = static_cast<Eigen::Index>(more.size()) / rows.cols(), before = rows.rows();
+  rows.conservativeResize(before + count, rows.cols());
+  rows.bottomRows(count) = Eigen::Map<const Points>(more.data(), count, rows.cols());
+}
+
+// The numeric point data of a piece; the first piece decides the names, and widths may not change.
+void append_arrays(const VtkXmlFile& file, pugi::xml_node piece, std::int64_t num_points, Geometry& geometry) {
+  const bool is_first = geometry.vertices.rows() == num_points;
+  for (pugi::xml_node node : piece.child("PointData").children("DataArray")) {
+    const std::string name = node.attribute("Name").as_string();
+    const std::string_view type = node.attribute("type").as_string();
+    if (name.empty() || type == "String" || type == "Bit") continue;
+    const std::int64_t columns = node.attribute("NumberOfComponents") ? file.count(node, "NumberOfComponents") : 1;
+    if (columns < 1 || columns > 1000) file.fail(node, fmt::format("found {} components", columns));
+    if (is_first && find_array(geometry.arrays, name) == nullptr)
+      geometry.arrays.push_back({name, Values<double>(0, columns)});
+    for (PointArray& array : geometry.arrays)
+      if (array.name == name && array.values.cols() == columns &&
+          array.values.rows() + num_points == geometry.vertices.rows())
+        append_rows(array.values, file.numbers(node, columns * num_points));
+  }
 }
 
 }  // namespace
@@ -43,7 +61,6 @@ Geometry read_vtk_xml(const std::filesystem::path& path) {
 
   Geometry geometry;
   geometry.vertices.resize(0, 3);
-  geometry.displacement.resize(0, 3);
   for (pugi::xml_node piece : data.children("Piece")) {
     const std::int64_t first_vertex = geometry.vertices.rows(), num_points = file.count(piece, "NumberOfPoints");
     // Three numbers a point, at best compressed 1000-fold: whatever exceeds this is refused before it is multiplied.
@@ -54,9 +71,7 @@ Geometry read_vtk_xml(const std::filesystem::path& path) {
     if (const std::int64_t width = file.count(points, "NumberOfComponents"); width != 3)
       file.fail(points, fmt::format("found {} components, expected 3", width));
     append_rows(geometry.vertices, file.numbers(points, 3 * num_points));
-    const pugi::xml_node displacement = file.find_array(piece.child("PointData"), "displacement");
-    if (displacement && std::string_view(displacement.attribute("NumberOfComponents").as_string()) == "3")
-      append_rows(geometry.displacement, file.numbers(displacement, 3 * num_points));
+    append_arrays(file, piece, num_points, geometry);
     if (is_grid) {
       const std::int64_t num_cells = file.count(piece, "NumberOfCells");
       if (num_cells == 0) continue;
@@ -76,7 +91,9 @@ Geometry read_vtk_xml(const std::filesystem::path& path) {
               .add_to(geometry, id, first_vertex);
     }
   }
-  if (geometry.displacement.rows() != geometry.vertices.rows()) geometry.displacement.resize(0, 3);
+  // Data of some pieces only is data of no point set.
+  std::erase_if(geometry.arrays,
+                [&](const PointArray& array) { return array.values.rows() != geometry.vertices.rows(); });
   return geometry;
 }
 

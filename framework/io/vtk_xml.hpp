@@ -5,7 +5,7 @@
 
 namespace halfgrad {
 
-/// The points and cells of all pieces, and the point vector `displacement`.
+/// The points and cells of all pieces, and the data at their points.
 Geometry read_vtk_xml(const std::filesystem::path& path);
 
 }  // namespace halfgrad

@@ -25,6 +25,7 @@ namespace {
 using nlohmann::json;
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 struct Outcome {
   int status;
@@ -100,9 +101,10 @@ class Program : public testing::Test {
 TEST_F(Program, TellsANewUserWhatItDoes) {
   const Outcome bare = run_program("");
   EXPECT_EQ(bare.status, 0);
-  EXPECT_THAT(bare.output, AllOf(HasSubstr("halfgrad deform"), HasSubstr("halfgrad run"), HasSubstr("halfgrad info")));
+  EXPECT_THAT(bare.output,
+              AllOf(HasSubstr("halfgrad deform"), HasSubstr("halfgrad export"), HasSubstr("halfgrad run")));
   EXPECT_EQ(run_program("--help").status, 0);
-  for (const char* command : {"run", "deform", "check", "list", "info"}) {
+  for (const char* command : {"run", "deform", "check", "export", "list", "info", "describe"}) {
     const Outcome help = run_program(std::string(command) + " --help");
     EXPECT_EQ(help.status, 0);
     EXPECT_THAT(help.output, HasSubstr("Example: halfgrad ")) << command;
@@ -116,6 +118,24 @@ TEST_F(Program, UsageErrorsExitWith2) {
   EXPECT_EQ(run_program("info").status, 2);
   EXPECT_EQ(run_program("list shoes").status, 2);
   EXPECT_EQ(run_program("--threads 0 list").status, 2);
+}
+
+TEST_F(Program, UsageErrorsSayWhatToTypeNext) {
+  EXPECT_THAT(run_program("dfeorm").output, AllOf(HasSubstr("did you mean deform?"), HasSubstr("halfgrad --help")));
+  EXPECT_THAT(run_program("dance").output, AllOf(HasSubstr("dance"), HasSubstr("deform, export")));
+  EXPECT_THAT(deform("--intepolant linear").output,
+              AllOf(HasSubstr("did you mean --interpolant?"), HasSubstr("halfgrad deform --help")));
+  EXPECT_THAT(run_program("deform --rest").output, AllOf(HasSubstr("--rest"), HasSubstr("halfgrad deform --help")));
+}
+
+TEST_F(Program, DescribesEveryCommandForShellsAndManuals) {
+  for (const char* format : {"bash", "zsh", "fish", "man", "markdown"}) {
+    const Outcome described = run_program(std::string("describe ") + format);
+    EXPECT_EQ(described.status, 0);
+    for (const char* word : {"deform", "export", "interpolant", "threads"})
+      EXPECT_THAT(described.output, HasSubstr(word)) << format;
+  }
+  EXPECT_THAT(run_program("describe docx").output, HasSubstr("markdown"));
 }
 
 TEST_F(Program, ListsWhatTheRegistriesHold) {
@@ -305,8 +325,154 @@ TEST_F(Program, BadInputIsRefusedByNameAndLeavesNothingBehind) {
   refused(deform(""), "frames of 100 vertices");
   Points broken = mesh.vertices();
   broken(7, 1) = std::numeric_limits<double>::quiet_NaN();
-  write_frames({mesh.vertices(), broken});
-  refused(deform(""), "7");
+  write_frames({broken, mesh.vertices()});
+  refused(deform(""), "vertex 7");
+}
+
+TEST_F(Program, FramesBeforeABadOneAreKeptAndResumed) {
+  const std::string frames = " --rest " + in("rest.vtu") + " --points " + in("points.vtp") + " --frames '" +
+                             in("sim_*.vtp") + "' --normals --stretch --out " + in("out.npy");
+  std::vector<Points> positions;
+  for (int f = 0; f < 5; ++f) {
+    positions.push_back(mesh.vertices() + f / 4.0 * (bent(mesh.vertices()) - mesh.vertices()));
+    write_vtp(in(fmt::format("sim_{}.vtp", f)), positions[static_cast<std::size_t>(f)]);
+  }
+  ASSERT_EQ(run_program("deform" + frames).status, 0);
+  const auto contents = [&] {
+    std::string all;
+    for (const char* name : {"out.npy", "out.normals.npy", "out.stretch.npy"}) {
+      std::ifstream file(in(name), std::ios::binary);
+      all.append(std::istreambuf_iterator<char>(file), {});
+      std::filesystem::remove(in(name));
+    }
+    return all;
+  };
+  const std::string expected = contents();
+
+  Points broken = positions[3];
+  broken(7, 1) = std::numeric_limits<double>::quiet_NaN();
+  write_vtp(in("sim_3.vtp"), broken);
+  const Outcome failed = run_program("deform" + frames);
+  EXPECT_EQ(failed.status, 2);
+  EXPECT_THAT(failed.output, AllOf(HasSubstr("sim_3.vtp"), HasSubstr("3 of 5 frames"), HasSubstr("--resume")));
+  EXPECT_FALSE(std::filesystem::exists(in("out.npy")));
+  write_vtp(in("sim_3.vtp"), positions[3]);
+  const Outcome resumed = run_program("deform --resume" + frames);
+  EXPECT_EQ(resumed.status, 0) << resumed.output;
+  EXPECT_THAT(resumed.output, HasSubstr("3 frames before them were there already"));
+  EXPECT_EQ(contents(), expected);
+  for (const std::string& name : files()) EXPECT_NE(name.front(), '.') << name;
+
+  // A frame that changed after the interrupted run began is carried again, and so are those behind it.
+  write_vtp(in("sim_3.vtp"), broken);
+  EXPECT_EQ(run_program("deform" + frames).status, 2);
+  write_vtp(in("sim_1.vtp"), positions[2]);
+  write_vtp(in("sim_3.vtp"), positions[3]);
+  EXPECT_THAT(run_program("deform --resume" + frames).output, HasSubstr("1 frames before them"));
+  // Other options make another run.
+  write_vtp(in("sim_3.vtp"), broken);
+  EXPECT_EQ(run_program("deform" + frames).status, 2);
+  write_vtp(in("sim_3.vtp"), positions[3]);
+  EXPECT_THAT(run_program("deform --resume --interpolant hermite" + frames).output,
+              AllOf(HasSubstr("5 frames"), Not(HasSubstr("there already"))));
+}
+
+TEST_F(Program, AKilledRunGoesOnToTheSameBytes) {
+  write_frames(std::vector<Points>(3000, bent(mesh.vertices())));
+  ASSERT_EQ(deform("", "whole.npy").status, 0);
+  const auto content = [&](const std::string& name) {
+    std::ifstream file(in(name), std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const std::string expected = content("whole.npy");
+  const std::string command = " deform --rest " + in("rest.vtu") + " --frames " + in("frames.npy") + " --points " +
+                              in("points.vtp") + " --out " + in("out.npy");
+  for (const char* signal : {"INT", "KILL"}) {
+    SCOPED_TRACE(signal);
+    // Longer and longer until the signal meets the frames, or at last the end.
+    for (double seconds = 0.01;
+         seconds < 30 && !std::filesystem::exists(in(".out.npy.run")) && !std::filesystem::exists(in("out.npy"));
+         seconds *= 1.3)
+      EXPECT_NE(
+          std::system(fmt::format("timeout -s {} {} {}{} > /dev/null 2>&1", signal, seconds, HALFGRAD_PROGRAM, command)
+                          .c_str()),
+          -1);
+    ASSERT_FALSE(std::filesystem::exists(in("out.npy"))) << "the program was never met while it wrote";
+    EXPECT_EQ(deform("--resume").status, 0);
+    EXPECT_EQ(content("out.npy"), expected);
+    std::filesystem::remove(in("out.npy"));
+  }
+}
+
+TEST_F(Program, ASavedBindingGivesTheSameBytes) {
+  for (const char* options : {"", "--interpolant dual_taylor", "--interpolant linear", "--outside nearest"}) {
+    SCOPED_TRACE(options);
+    ASSERT_EQ(deform(options).status, 0);
+    const Outcome bound = run_program("bind --rest " + in("rest.vtu") + " --points " + in("points.vtp") + " --out " +
+                                      in("x.hgb") + " " + options);
+    ASSERT_EQ(bound.status, 0) << bound.output;
+    const std::string command = "deform --binding " + in("x.hgb") + " --frames " + in("frames.npy") + " --out ";
+    const Outcome deformed = run_program(command + in("bound.npy"));
+    ASSERT_EQ(deformed.status, 0) << deformed.output;
+    for (Index f = 0; f < 3; ++f) EXPECT_EQ(frame("bound.npy", f), frame("out.npy", f));
+  }
+  const std::string command = "deform --binding " + in("x.hgb") + " --frames " + in("frames.npy") + " --out ";
+  const auto refused = [&](const std::string& more, const std::string& fact) {
+    const Outcome outcome = run_program(command + in("no.npy") + more);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.output, AllOf(HasSubstr(fact), HasSubstr("x.hgb"))) << more;
+  };
+  refused(" --interpolant hermite", "bind again");
+  refused(" --reconstructor kriging", "bind again");
+  refused(" --outside mark", "bind again");
+  surface.points(0, 0) += 0.01;
+  write_vtp(directory / "points.vtp", surface.points, surface.faces);
+  refused("", "other points");
+  surface.points(0, 0) -= 0.01;
+  write_vtp(directory / "points.vtp", surface.points, surface.faces);
+  write_vtu(directory / "rest.vtu", test::lattice<Tetrahedron>(4, 0.2, 4));
+  refused("", "another rest mesh");
+  std::filesystem::resize_file(in("x.hgb"), std::filesystem::file_size(in("x.hgb")) / 2);
+  refused("", "no binding");
+  std::ofstream(in("x.hgb")) << "v 1 2 3\n";
+  refused("", "no binding");
+}
+
+TEST_F(Program, FieldsAndSmoothNormalsAreCarried) {
+  // A linear field is carried exactly whatever the deformation; a surface's own data goes through.
+  Values<double> field(mesh.num_vertices(), 2);
+  field.col(0) = mesh.vertices().col(0) * 3 - mesh.vertices().col(1);
+  field.col(1).setConstant(7);
+  write_npy(in("stress.npy"), field);
+  write_vtu(directory / "rest.vtu", mesh, std::vector{PointArray{"heat", field}});
+  Values<double> uv(4, 2);
+  uv << 0, 0, 1, 0, 1, 1, 0, 1;
+  write_vtp(directory / "points.vtp", surface.points, surface.faces, std::vector{PointArray{"uv", uv}});
+  const Outcome outcome =
+      deform("--field heat --field stress=" + in("stress.npy") + " --normals smooth --stretch", "out.pvd");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  Values<double> expected(4, 2);
+  expected.col(0) = surface.points.col(0) * 3 - surface.points.col(1);
+  expected.col(1).setConstant(7);
+  for (int f = 0; f < 3; ++f) {
+    const PointSet result = read_points(in(fmt::format("out_{:04}.vtp", f)));
+    const auto array = [&](const char* name) {
+      const PointArray* found = find_array(result.arrays, name);
+      return found == nullptr ? Values<double>() : found->values;
+    };
+    EXPECT_EQ(array("uv"), uv);
+    for (const char* name : {"heat", "stress"}) {
+      ASSERT_EQ(array(name).rows(), 4) << name;
+      EXPECT_LT((array(name) - expected).cwiseAbs().maxCoeff(), 1e-12);
+    }
+    ASSERT_EQ(array("normals").rows(), 4);
+    EXPECT_LT((array("normals").rowwise().norm().array() - 1).abs().maxCoeff(), 1e-14);
+    if (f < 2) {
+      EXPECT_LT((array("stretch").array() - 1).abs().maxCoeff(), 1e-12);
+    }
+  }
+  EXPECT_THAT(deform("--field pressure").output, AllOf(HasSubstr("pressure"), HasSubstr("heat")));
+  EXPECT_THAT(deform("--normals fancy").output, HasSubstr("expected gradient or smooth"));
 }
 
 TEST_F(Program, RunExitsWith3WhereAnExpectationFails) {

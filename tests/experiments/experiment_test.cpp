@@ -189,6 +189,25 @@ TEST_F(Run, ExactGradientsReproduceQuadratics) {
   EXPECT_LT(result.rows[1].error[0].max, 1e-14);
 }
 
+TEST_F(Run, HoldsOutVerticesAndRecommends) {
+  const ExperimentResult result = run_experiment(config(json::parse(R"({
+    "mesh": {"lattice": {"cells": 8, "jitter": 0.2}, "refinements": 1}, "points": null, "hold_out": {"folds": 2},
+    "reconstructors": ["chandrashekar_garg", "kriging", "adaptive"]})")),
+                                                 {.out_directory = folder_ / "out"});
+  ASSERT_TRUE(result.recommendation);
+  EXPECT_EQ(result.rows.size(), 4u);
+  EXPECT_TRUE(result.orders.empty());
+  EXPECT_EQ(result.recommendation->points, result.rows[0].points);
+  const json document = json::parse(std::ifstream(folder_ / "out/results.json"));
+  EXPECT_EQ(document["recommendation"]["interpolant"], result.recommendation->chosen.interpolant);
+  EXPECT_THAT(summary_table(result), HasSubstr("recommended: phong + "));
+
+  EXPECT_THAT(refusal(R"({"hold_out": {}})"), HasSubstr("/points"));
+  EXPECT_THAT(refusal(R"({"points": null, "hold_out": {}})"), HasSubstr("/hold_out: found 2 levels"));
+  EXPECT_THAT(refusal(R"({"points": null, "mesh": {"refinements": 1}, "hold_out": {"fold": 2}})"),
+              HasSubstr("did you mean \"folds\""));
+}
+
 // Every configuration that needs no files runs reduced and meets what it expects.
 class Config : public testing::TestWithParam<std::string> {};
 

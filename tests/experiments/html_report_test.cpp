@@ -45,7 +45,8 @@ std::size_t count(const std::string& text, const std::string& word) {
 }
 
 TEST(HtmlReport, IsWellFormedAndNeedsNothingElse) {
-  const std::string html = results_html(small_result());
+  const ExperimentResult result = small_result();
+  const std::string html = results_html(result.name, {&result, 1});
   EXPECT_THAT(html, AllOf(HasSubstr("a &lt;b&gt; &amp; c"), HasSubstr("x &lt; y"), Not(HasSubstr("<script")),
                           Not(HasSubstr("src=")), Not(HasSubstr("href="))));
   // Every chart is XML by itself.
@@ -60,7 +61,8 @@ TEST(HtmlReport, IsWellFormedAndNeedsNothingElse) {
 }
 
 TEST(HtmlReport, MarksTheBestOfEachColumn) {
-  const std::string html = results_html(small_result());
+  const ExperimentResult result = small_result();
+  const std::string html = results_html(result.name, {&result, 1});
   const std::string table = html.substr(html.find("<table>"), html.find("</table>") - html.find("<table>"));
   const std::string phong = table.substr(table.find("phong"));
   EXPECT_THAT(phong, HasSubstr("<td class='best'>1.000e-03</td>"));

@@ -170,6 +170,7 @@ TEST(CellsWithoutVolume, LeaveTheAveragesAloneAndQuadraticsExact) {
   std::iota(vertices.begin(), vertices.end(), 0);
   const Values<double> values = spoilt.vertices().rowwise().squaredNorm();
   for (const ReconstructorEntry& entry : reconstructor_registry()) {
+    if (entry.name == "centered_difference") continue;  // for grids only
     const auto gradients = [&](const Mesh& mesh) {
       const Reconstruction rows =
           make_reconstructor(std::string(entry.name)).reconstructor->reconstruct(CellGradients(mesh), vertices);

@@ -1,6 +1,7 @@
 // Frames in and out.
 #include <random>
 
+#include "framework/io/field_source.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
 #include "framework/io/npy.hpp"
@@ -133,13 +134,102 @@ TEST_F(Frames, ObjPassesEverythingElseThrough) {
   EXPECT_THAT(message_of([&] { wrong->write(Points(Points::Zero(4, 3))); }), HasSubstr("4 points"));
 }
 
-TEST_F(Frames, NothingAppearsWithoutFinish) {
-  for (const char* name : {"a.npy", "a.pc2", "a.%d.obj", "a.pvd"}) {
+TEST_F(Frames, NothingIncompleteAppears) {
+  for (const char* name : {"a.npy", "a.pc2"}) {
     const auto sink = create_frames(file(name));
     for (int f = 0; f < 3; ++f) sink->write(frame_values<float>(f));
     for (const std::string& found : names()) EXPECT_EQ(found.front(), '.') << found;
   }
   EXPECT_THAT(names(), ElementsAre());
+  // Files of a frame are complete one by one; the collection comes when all that it names is there.
+  for (const char* name : {"a.%d.obj", "a.pvd"}) {
+    const auto sink = create_frames(file(name));
+    for (int f = 0; f < 2; ++f) sink->write(frame_values<float>(f));
+  }
+  EXPECT_THAT(names(), ElementsAre("a.0.obj", "a.1.obj", "a_0000.vtp", "a_0001.vtp"));
+}
+
+TEST_F(Frames, AnInterruptedRunGoesOn) {
+  for (const char* name : {"a.npy", "a.pc2", "a.%d.obj", "a.pvd"}) {
+    SCOPED_TRACE(name);
+    FrameSinkOptions options{.first = 20, .step = 5, .run = "this run"};
+    const auto write = [&](FrameSink& sink, int begin, int end) {
+      for (int f = begin; f < end; ++f) sink.write(frame_values<float>(f));
+    };
+    const auto contents = [&] {
+      std::string all;
+      for (const std::string& found : names()) all += found + '\n' + contents_of(file(found)) + '\n';
+      return all;
+    };
+    const auto whole = create_frames(file(name), {}, options);
+    write(*whole, 0, 7);
+    whole->finish();
+    const std::string expected = contents();
+    for (const std::string& found : names()) std::filesystem::remove(file(found));
+
+    write(*create_frames(file(name), {}, options), 0, 4);
+    // A kill in the middle of a frame leaves a piece of it.
+    const std::filesystem::path unfinished = folder_ / ("." + std::string(name) + ".unfinished");
+    if (std::filesystem::exists(unfinished)) std::ofstream(unfinished, std::ios::app) << "half a fr";
+    options.unfinished = Unfinished::resume;
+    options.run = "another run";
+    EXPECT_EQ(create_frames(file(name), {}, options)->num_resumable(), 0);
+    options.run = "this run";
+    write(*create_frames(file(name), {}, {.first = 20, .step = 5, .run = "this run"}), 0, 4);
+    const auto sink = create_frames(file(name), {}, options);
+    ASSERT_EQ(sink->num_resumable(), 4);
+    sink->resume(3);
+    write(*sink, 3, 7);
+    sink->finish();
+    EXPECT_EQ(contents(), expected);
+    for (const std::string& found : names()) std::filesystem::remove(file(found));
+  }
+}
+
+TEST_F(Frames, OneProcessWritesAFile) {
+  const FrameSinkOptions options{.run = "a run"};
+  const auto sink = create_frames(file("a.npy"), {}, options);
+  EXPECT_THAT(message_of([&] { create_frames(file("a.npy"), {}, options); }),
+              AllOf(HasSubstr("a.npy"), HasSubstr("another process")));
+}
+
+TEST_F(Frames, FilesAndTimesAreNumberedAsTheCallerCounts) {
+  for (const char* name : {"a.%03d.obj", "a.pvd", "a.pc2"}) {
+    const auto sink = create_frames(file(name), {}, {.first = 7, .step = 4});
+    for (int f = 0; f < 2; ++f) sink->write(frame_values<float>(f));
+    sink->finish();
+  }
+  EXPECT_THAT(names(), ElementsAre("a.007.obj", "a.011.obj", "a.pc2", "a.pvd", "a_0007.vtp", "a_0011.vtp"));
+  EXPECT_THAT(contents_of(file("a.pvd")), AllOf(HasSubstr("timestep=\"7\""), HasSubstr("timestep=\"11\"")));
+  EXPECT_EQ(contents_of(file("a.pc2")).substr(20, 8), bytes<float>({7, 4}));
+}
+
+TEST_F(Frames, FieldsComeFromArraysFrameFilesOrTheRestMesh) {
+  Values<double> heat(4, 1), stress(4, 6);
+  heat << 1, 2, 3, 4;
+  stress.setRandom();
+  const Points points = frame_values<double>(0);
+  write_vtp(file("rest.vtp"), points, {}, std::vector{PointArray{"heat", heat}});
+  for (int f = 0; f < 3; ++f)
+    write_vtp(file(fmt::format("x{}.vtp", f)), points, {}, std::vector{PointArray{"stress", (f + 1) * stress}});
+  write_npy(file("k.npy"), heat);
+  const auto frames = open_frames(file("x*.vtp").string());
+  const auto values = [&](const std::string& spec, Index frame) {
+    FieldSource field(spec, file("rest.vtp"), *frames);
+    Values<double> result;
+    field.read(frame, result);
+    return result;
+  };
+  EXPECT_EQ(values("heat", 2), heat);
+  EXPECT_EQ(values("stress", 2), 3 * stress);
+  EXPECT_EQ(values("k=" + file("k.npy").string(), 1), heat);
+  EXPECT_THAT(message_of([&] { values("strain", 0); }), AllOf(HasSubstr("stress"), HasSubstr("heat")));
+  write_npy(file("short.npy"), Values<double>(heat.topRows(3)));
+  EXPECT_THAT(message_of([&] { values("s=" + file("short.npy").string(), 0); }),
+              AllOf(HasSubstr("3 vertices"), HasSubstr("of 4")));
+  heat(2, 0) = std::numeric_limits<double>::quiet_NaN();
+  write_vtp(file("rest.vtp"), points, {}, std::vector{PointArray{"heat", heat}});
+  EXPECT_THAT(message_of([&] { values("heat", 0); }), AllOf(HasSubstr("vertex 2"), HasSubstr("not finite")));
 }
 
 TEST_F(Frames, SinksRefuseWhatTheyCannotHold) {

@@ -170,8 +170,7 @@ TEST_F(MeshFileErrors, SayWhatIsWrongWithTheFile) {
   EXPECT_THAT(message_of([&] { read_mesh(file("folder.vtu")); }), HasSubstr("found a folder"));
   EXPECT_THAT(message_of([&] { read_mesh("a.vtj"); }),
               AllOf(HasSubstr(".vtj"), HasSubstr(".msh, .vtk, .vtu"), HasSubstr("did you mean")));
-  EXPECT_THAT(message_of([&] { read_mesh("a.obj"); }),
-              AllOf(HasSubstr("Wavefront OBJ"), HasSubstr("meshes are read from")));
+  EXPECT_THAT(message_of([&] { read_mesh("a.npy"); }), AllOf(HasSubstr("NumPy"), HasSubstr("meshes are read from")));
 }
 
 constexpr const char* small_msh =
@@ -206,7 +205,65 @@ TEST_F(MeshFileErrors, SayWhatIsWrongInTheFile) {
   EXPECT_THAT(message("$Nodes\n4", "$Nodes\n1000000000000000000"), HasSubstr("1000000000000000000 nodes"));
   EXPECT_THAT(message("2.2 0", "3.0 0"), AllOf(HasSubstr("version 3"), HasSubstr("2.2 or 4.1")));
   EXPECT_THAT(message("2 2 2 0 1", "2 9 2 0 1"), AllOf(HasSubstr("type 9"), HasSubstr("a.msh:14")));
-  EXPECT_THAT(message("30 0 1 5", "30 0 1 6"), HasSubstr("not supported yet"));
+  EXPECT_THAT(message("2\n1 1 2 0 1 10 20\n2 2 2 0 1 10 20 30\n", "1\n1 1 2 0 1 10 30\n"),
+              AllOf(HasSubstr("dimension 1 with varying y"), HasSubstr("curves")));
+}
+
+TEST_F(MeshFileErrors, TrianglesWhoseHeightVariesAreASurface) {
+  const Mesh mesh = read_mesh(file("a.msh", replaced(small_msh, "30 0 1 5", "30 0 1 6")));
+  EXPECT_TRUE(mesh.is_surface());
+  EXPECT_EQ(mesh.gdim(), 3);
+  EXPECT_EQ(mesh.vertices()(2, 2), 6);
+  const Mesh faces = read_mesh(file("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 0\nf 1 2 3 4\nf 1//1 2//1 3//1\n"));
+  EXPECT_TRUE(faces.is_surface());
+  ASSERT_EQ(faces.num_cells(), 2);
+  EXPECT_EQ(element_name(faces, 0), "quadrilateral");
+  EXPECT_EQ(element_name(faces, 1), "triangle");
+  EXPECT_THAT(
+      message_of([&] { read_mesh(file("b.obj", "v 0 0 0\nv 1 0 0\nv 2 1 0\nv 1 2 1\nv 0 1 0\nf 1 2 3 4 5\n")); }),
+      AllOf(HasSubstr("polygon"), HasSubstr("not a registered element")));
+}
+
+constexpr const char* image_file =
+    "<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
+    "<ImageData WholeExtent=\"1 3 0 2 0 0\" Origin=\"10 0 5\" Spacing=\"0.5 2 1\">\n"
+    "<Piece Extent=\"1 3 0 2 0 0\"><PointData/><CellData>"
+    "<DataArray type=\"UInt8\" Name=\"vtkGhostType\" format=\"ascii\">0 32 0 0</DataArray>"
+    "</CellData></Piece></ImageData></VTKFile>\n";
+
+TEST_F(MeshFileErrors, ImagesAreGridsAndHiddenCellsAreMissing) {
+  const RestShape shape = read_rest_shape(file("a.vti", image_file));
+  const Grid& grid = std::get<Grid>(shape);
+  EXPECT_EQ(grid.gdim(), 2);
+  EXPECT_EQ(grid.num_cells(), 3);
+  EXPECT_EQ(grid.num_vertices(), 8);  // all nine but the corner of the hidden cell
+  EXPECT_EQ(grid.cell_at({1, 0}), -1);
+  EXPECT_EQ(grid.position(0), Eigen::Vector2d(10.5, 0));
+  const Mesh mesh = read_mesh(file("a.vti"));
+  EXPECT_EQ(mesh.num_cells(), 3);
+  EXPECT_EQ(mesh.vertices().row(7), Eigen::RowVector2d(11.5, 4));
+  const auto message = [&](const std::string& from, const std::string& to) {
+    return message_of([&] { read_rest_shape(file("b.vti", replaced(image_file, from, to))); });
+  };
+  EXPECT_THAT(message("WholeExtent=\"1 3", "WholeExtent=\"1 4"), HasSubstr("one piece"));
+  EXPECT_THAT(message("0 32 0 0", "0 32 0"), HasSubstr("expected 4"));
+  EXPECT_THAT(message("Spacing=\"0.5 2 1\"", "Spacing=\"0 2 1\""), AllOf(HasSubstr("b.vti"), HasSubstr("spacing 0")));
+  EXPECT_THAT(message("0 2 0 0\" Origin", "0 x 0 0\" Origin"), HasSubstr("6 numbers"));
+  EXPECT_THAT(message("0 32 0 0", "32 32 32 32"), HasSubstr("without occupied cells"));
+}
+
+TEST_F(MeshFileErrors, RectilinearGridsAreGraded) {
+  const RestShape shape = read_rest_shape(
+      file("a.vtr",
+           "<VTKFile type=\"RectilinearGrid\" version=\"0.1\"><RectilinearGrid WholeExtent=\"0 2 0 1 0 1\">"
+           "<Piece Extent=\"0 2 0 1 0 1\"><Coordinates>"
+           "<DataArray type=\"Float64\" format=\"ascii\">0 0.5 2</DataArray>"
+           "<DataArray type=\"Float64\" format=\"ascii\">-1 1</DataArray>"
+           "<DataArray type=\"Float64\" format=\"ascii\">3 4</DataArray>"
+           "</Coordinates></Piece></RectilinearGrid></VTKFile>"));
+  const Grid& grid = std::get<Grid>(shape);
+  EXPECT_EQ(grid.num_cells(), 2);
+  EXPECT_EQ(grid.position(11), Eigen::Vector3d(2, 1, 4));
 }
 
 TEST_F(MeshFileErrors, CountsBeyondTheFileFailFast) {

@@ -158,7 +158,11 @@ TEST_F(PointFiles, VtuAndVtpReadBackBitForBit) {
   ASSERT_EQ(back.num_cells(), mesh.num_cells());
   for (Index c = 0; c < mesh.num_cells(); ++c)
     EXPECT_TRUE(std::ranges::equal(back.cell_vertices(c), mesh.cell_vertices(c)));
-  EXPECT_EQ(read_points(file("a.vtu")).displacement, displacement.values);
+  const std::vector<PointArray> arrays = read_points(file("a.vtu")).arrays;
+  ASSERT_EQ(arrays.size(), 2U);
+  EXPECT_EQ(arrays[0].name, scalar.name);
+  EXPECT_EQ(arrays[0].values, scalar.values);
+  EXPECT_EQ(arrays[1].values, displacement.values);
 
   IndexTable faces;
   faces.offsets = {0, 3, 7};

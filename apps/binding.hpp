@@ -1,0 +1,71 @@
+// Points bound to a mesh under the options that all commands share.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "framework/embedding.hpp"
+#include "framework/gradient_stencils.hpp"
+#include "framework/grid.hpp"
+#include "framework/interpolation_rule.hpp"
+#include "framework/io/point_set.hpp"
+#include "framework/surface.hpp"
+
+namespace halfgrad::app {
+
+/// The options of `deform`, `bind` and `export` that decide a binding.
+struct BindOptions {
+  std::filesystem::path rest, points;
+  std::filesystem::path binding;  ///< a saved binding; it fills in what the others leave open
+  std::optional<std::string> interpolant;
+  std::optional<double> alpha;
+  /// A name or JSON; empty: what the command prefers, on grids centered_difference, for dual_taylor kriging with cubic
+  /// drift.
+  std::string reconstructor;
+  std::optional<std::string> outside;
+};
+
+/// Options read and checked, before any large file is opened.
+struct BindSettings {
+  std::filesystem::path rest, points, binding;
+  std::string interpolant, outside;
+  InterpolationRule rule;
+  std::string reconstructor, reconstructor_options;  ///< name and compact JSON object
+  std::string specification;                         ///< JSON that make_reconstructor reads
+
+  std::string to_json() const;
+};
+
+/// Where the user names no reconstructor: `preferred`, or for rules that need Hessians kriging with cubic drift. Throws
+/// Error on unknown names and values, and on options that contradict the saved binding.
+BindSettings parse_settings(const BindOptions& options, std::string_view preferred = "adaptive");
+
+/// What binding took and gave.
+struct Binding {
+  std::optional<Grid> grid;  ///< instead of a mesh
+  Mesh mesh;                 ///< a surface in space too
+  MeshReport quality;        ///< of a mesh
+  PointSet surface;
+  Points points;  ///< of the surface, in the mesh's dimension
+  std::string fingerprint;
+  Embedding embedding;
+  SurfaceEmbedding feet;  ///< instead of an embedding, of points near a surface
+  std::optional<Reconstruction> reconstruction;
+
+  bool on_surface() const { return mesh.is_surface(); }
+  int gdim() const { return grid ? grid->gdim() : mesh.gdim(); }
+  Index num_vertices() const { return grid ? grid->num_vertices() : mesh.num_vertices(); }
+};
+
+/// Reads the rest shape and the points. Throws Error on degenerate cells.
+Binding read_inputs(const BindSettings& settings);
+/// Locates the points, or takes them from the saved binding.
+void locate(const BindSettings& settings, Binding& binding);
+/// Reconstructs gradients at the vertices that the points need, unless the saved binding has them.
+void reconstruct(const BindSettings& settings, Binding& binding);
+
+/// Runs `halfgrad bind`.
+void save_binding(const BindOptions& options, const std::filesystem::path& out, bool quiet);
+
+}  // namespace halfgrad::app

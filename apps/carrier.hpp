@@ -1,0 +1,26 @@
+// What carries points, whatever the rest shape that they are bound to.
+#pragma once
+
+#include <functional>
+
+#include "apps/binding.hpp"
+#include "framework/interpolant.hpp"
+
+namespace halfgrad::app {
+
+/// An interpolant of a mesh, of a grid or of a surface, as functions of the vertices' positions or other data.
+template <class Scalar>
+struct Carrier {
+  BindReport report;
+  int gdim = 0;
+  std::function<void(const Values<Scalar>& positions, Values<Scalar>& out, const EvaluateOptions&)> evaluate;
+  std::function<Values<Scalar>(const Values<Scalar>& values)> evaluate_field;
+  std::function<Values<Scalar>(const Values<Scalar>&positions)> gradient, smooth_gradient;
+  std::function<Index(const Values<Scalar>& positions, const EvaluateOptions&)> num_linear_cells;
+};
+
+/// Binds for frames. One thread at a time may evaluate.
+template <class Scalar>
+Carrier<Scalar> make_carrier(const Binding& binding, const InterpolationRule& rule);
+
+}  // namespace halfgrad::app

@@ -1,0 +1,111 @@
+// The program on rest shapes that are no ordinary mesh: grids and surfaces in space.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "framework/io/frame_sink.hpp"
+#include "framework/io/frame_source.hpp"
+#include "framework/io/mesh_file.hpp"
+
+namespace halfgrad {
+namespace {
+
+using testing::HasSubstr;
+
+class RestShapes : public testing::Test {
+ protected:
+  void SetUp() override {
+    directory = std::filesystem::temp_directory_path() /
+                (std::string("halfgrad_shapes_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::remove_all(directory);
+    std::filesystem::create_directories(directory);
+  }
+  void TearDown() override { std::filesystem::remove_all(directory); }
+
+  std::string in(const std::string& name) const { return (directory / name).string(); }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(directory / name) << text; }
+  void write_array(const std::string& name, const Points& points) const {
+    const auto sink = create_frames(directory / name);
+    sink->write(points);
+    sink->finish();
+  }
+  Values<double> read_array(const std::string& name) const {
+    Values<double> values;
+    open_frames(in(name))->read(0, values);
+    return values;
+  }
+  int run(const std::string& arguments) {
+    std::FILE* pipe = popen((std::string(HALFGRAD_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
+    output.clear();
+    std::array<char, 4096> buffer;
+    while (const std::size_t got = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.append(buffer.data(), got);
+    const int status = pclose(pipe);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+  std::filesystem::path directory;
+  std::string output;
+};
+
+Points parabola(const Points& points) {
+  Points result = points;
+  result.col(2) += 0.5 * points.col(0).cwiseAbs2() - points.col(0).cwiseProduct(points.col(1));
+  return result;
+}
+
+TEST_F(RestShapes, GridsCarryPoints) {
+  write("grid.vti",
+        "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 3 0 2 0 2\" Origin=\"1 0 0\" Spacing=\"0.5 1 1\">"
+        "<Piece Extent=\"0 3 0 2 0 2\"/></ImageData></VTKFile>");
+  const Points rest = read_mesh(in("grid.vti")).vertices();
+  ASSERT_EQ(rest.rows(), 36);
+  write_array("frames.npy", parabola(rest));
+  Points points(3, 3);
+  points << 1.2, 0.3, 1.7, 2.5, 1, 0, 1.9, 1.4, 0.6;
+  write_array("points.npy", points);
+  const std::string arguments = "deform --rest " + in("grid.vti") + " --frames " + in("frames.npy") + " --points " +
+                                in("points.npy") + " --out " + in("out.npy") + " --report " + in("report.json");
+  ASSERT_EQ(run(arguments), 0) << output;
+  EXPECT_THAT(output, HasSubstr("centered_difference"));
+  // Quadratic fields are exact, boundary cells included.
+  EXPECT_LT((read_array("out.npy") - parabola(points)).cwiseAbs().maxCoeff(), 1e-12);
+  const nlohmann::json report = nlohmann::json::parse(std::ifstream(directory / "report.json"));
+  EXPECT_EQ(report["counts"]["vertices"], 36);
+  ASSERT_EQ(run(arguments + " --reconstructor adaptive"), 0) << output;
+  ASSERT_EQ(run("info " + in("grid.vti")), 0) << output;
+  EXPECT_THAT(output, HasSubstr("12 cells"));
+}
+
+TEST_F(RestShapes, SurfacesCarryPointsBesideThem) {
+  // A roof of two slopes; a rigid turn of it turns points above and beside it alike.
+  write("cloth.obj", "v 0 0 0\nv 1 0 0.3\nv 2 0 0\nv 0 1 0\nv 1 1 0.3\nv 2 1 0\nf 1 2 5 4\nf 2 3 6\nf 2 6 5\n");
+  const Points rest = read_mesh(in("cloth.obj")).vertices();
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.2, Eigen::Vector3d(1, 1, 3).normalized()).toRotationMatrix();
+  write_array("frames.npy", rest * turn.transpose());
+  Points points(4, 3);
+  points << 0.4, 0.5, 0.5, 1, 0.2, 0.31, 1.6, 0.9, -0.2, 2.5, 1.5, 0.1;
+  write_array("points.npy", points);
+  const std::string arguments =
+      "deform --rest " + in("cloth.obj") + " --points " + in("points.npy") + " --out " + in("out.npy") + " --frames ";
+  for (const char* options : {"", " --interpolant linear", " --reconstructor kriging --precision float --gradients"}) {
+    ASSERT_EQ(run(arguments + in("frames.npy") + options), 0) << output;
+    EXPECT_THAT(output, HasSubstr("from the surface"));
+    EXPECT_LT((read_array("out.npy") - points * turn.transpose()).cwiseAbs().maxCoeff(), 1e-6) << options;
+  }
+  write_array("flat.npy", rest.leftCols(2));
+  EXPECT_EQ(run(arguments + in("flat.npy")), 2);
+  EXPECT_THAT(output, HasSubstr("surface in space"));
+  EXPECT_EQ(run(arguments + in("frames.npy") + " --interpolant dual_taylor"), 2);
+  EXPECT_THAT(output, HasSubstr("hermite"));
+  ASSERT_EQ(run("info " + in("cloth.obj")), 0) << output;
+}
+
+}  // namespace
+}  // namespace halfgrad

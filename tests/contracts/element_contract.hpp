@@ -1,0 +1,202 @@
+// What every element must satisfy, as a GoogleTest suite for elements of this project and of others: include it, then
+//
+//   INSTANTIATE_TYPED_TEST_SUITE_P(Mine, ElementContract, testing::Types<MyElement>);
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "framework/cell_blocks.hpp"
+#include "framework/interpolant.hpp"
+
+namespace halfgrad {
+
+/// ξ uniformly inside a reference cell.
+template <Element E>
+ReferencePoint<E> contract_point(std::mt19937& random) {
+  const NodeMatrix<E> nodes = E::nodes();
+  std::uniform_real_distribution<double> uniform(0, 1);
+  ReferencePoint<E> xi;
+  do {
+    for (int a = 0; a < E::dim; ++a) {
+      const double low = nodes.col(a).minCoeff(), high = nodes.col(a).maxCoeff();
+      xi[a] = low + (high - low) * uniform(random);
+    }
+  } while (!contains<E>(xi, 0));
+  return xi;
+}
+
+/// The reference cell with every node moved by up to `reach` times its box along each axis.
+template <Element E>
+NodeMatrix<E> contract_cell(std::mt19937& random, double reach) {
+  NodeMatrix<E> nodes = E::nodes();
+  std::uniform_real_distribution<double> uniform(-reach, reach);
+  for (int a = 0; a < E::dim; ++a) {
+    const double extent = nodes.col(a).maxCoeff() - nodes.col(a).minCoeff();
+    for (int i = 0; i < E::num_nodes; ++i) nodes(i, a) += extent * uniform(random);
+  }
+  return nodes;
+}
+
+template <class E>
+class ElementContract : public testing::Test {};
+TYPED_TEST_SUITE_P(ElementContract);
+
+TYPED_TEST_P(ElementContract, SatisfiesTheConcept) { static_assert(Element<TypeParam>); }
+
+TYPED_TEST_P(ElementContract, ShapeIsOneAtItsNodeAndZeroAtOthers) {
+  const auto nodes = TypeParam::nodes();
+  for (int i = 0; i < TypeParam::num_nodes; ++i) {
+    const NodeVector<TypeParam> beta = TypeParam::shape(nodes.row(i).transpose());
+    for (int j = 0; j < TypeParam::num_nodes; ++j) EXPECT_NEAR(beta[j], i == j ? 1 : 0, 1e-14);
+  }
+}
+
+TYPED_TEST_P(ElementContract, WeightsSumToOneAndReproducePosition) {
+  std::mt19937 random(1);
+  const auto nodes = TypeParam::nodes();
+  for (int n = 0; n < 200; ++n) {
+    const auto xi = contract_point<TypeParam>(random);
+    const NodeVector<TypeParam> beta = TypeParam::shape(xi);
+    EXPECT_NEAR(beta.sum(), 1, 1e-14);
+    EXPECT_LT((nodes.transpose() * beta - xi).norm(), 1e-14);
+  }
+}
+
+TYPED_TEST_P(ElementContract, PolynomialsAreTheShapeFunctions) {
+  if constexpr (PolynomialElement<TypeParam>) {
+    std::mt19937 random(4);
+    for (int n = 0; n < 50; ++n) {
+      const auto xi = contract_point<TypeParam>(random);
+      NodeVector<TypeParam> beta = NodeVector<TypeParam>::Zero();
+      for (std::size_t m = 0; m < TypeParam::shape_monomials.size(); ++m) {
+        double monomial = 1;
+        for (int k = 0; k < TypeParam::dim; ++k)
+          monomial *= std::pow(xi[k], TypeParam::shape_monomials[m][static_cast<std::size_t>(k)]);
+        for (int i = 0; i < TypeParam::num_nodes; ++i)
+          beta[i] += TypeParam::shape_coefficients[m][static_cast<std::size_t>(i)] * monomial;
+      }
+      EXPECT_LT((beta - TypeParam::shape(xi)).cwiseAbs().maxCoeff(), 1e-15 * 8);
+    }
+    EXPECT_EQ(TypeParam::shape_monomials[0], (std::array<int, TypeParam::dim>{}));
+  } else {
+    GTEST_SKIP() << TypeParam::name << " states no polynomials";
+  }
+}
+
+TYPED_TEST_P(ElementContract, GradientIsTheDerivativeOfShape) {
+  std::mt19937 random(2);
+  for (int n = 0; n < 50; ++n) {
+    const auto xi = contract_point<TypeParam>(random);
+    const NodeMatrix<TypeParam> gradient = TypeParam::shape_gradient(xi);
+    for (int a = 0; a < TypeParam::dim; ++a) {
+      constexpr double step = 1e-6;
+      ReferencePoint<TypeParam> plus = xi, minus = xi;
+      plus[a] += step;
+      minus[a] -= step;
+      const NodeVector<TypeParam> difference = (TypeParam::shape(plus) - TypeParam::shape(minus)) / (2 * step);
+      EXPECT_LT((gradient.col(a) - difference).cwiseAbs().maxCoeff(), 1e-8);
+    }
+  }
+}
+
+TYPED_TEST_P(ElementContract, MarginIsZeroAtNodesAndPositiveAtTheCenter) {
+  const auto nodes = TypeParam::nodes();
+  EXPECT_GT(TypeParam::margin(TypeParam::center()), 0.1);
+  for (int i = 0; i < TypeParam::num_nodes; ++i) {
+    const ReferencePoint<TypeParam> node = nodes.row(i).transpose();
+    EXPECT_NEAR(TypeParam::margin(node), 0, 1e-15);
+    EXPECT_FALSE(contains<TypeParam>(node + 1e-6 * (node - TypeParam::center()), 1e-9));
+    EXPECT_FALSE(contains<TypeParam>(node + 2 * (node - TypeParam::center()), 0));
+  }
+}
+
+TYPED_TEST_P(ElementContract, FacetsLieOnTheBoundaryAndCoverEveryNode) {
+  const auto nodes = TypeParam::nodes();
+  std::array<int, TypeParam::num_nodes> uses{};
+  for (const Facet& facet : TypeParam::facets) {
+    ReferencePoint<TypeParam> middle = ReferencePoint<TypeParam>::Zero();
+    for (int i = 0; i < facet.num_nodes; ++i) {
+      ++uses[facet.nodes[i]];
+      middle += nodes.row(facet.nodes[i]).transpose() / facet.num_nodes;
+    }
+    EXPECT_NEAR(TypeParam::margin(middle), 0, 1e-15);
+    // Outward: a step from the center through the facet leaves the cell.
+    EXPECT_LT(TypeParam::margin(middle + 0.1 * (middle - TypeParam::center())), 0);
+  }
+  for (int count : uses) EXPECT_GE(count, TypeParam::dim);
+}
+
+TYPED_TEST_P(ElementContract, ReferenceVolumeIsTheShareOfTheNodesBox) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const NodeMatrix<TypeParam> nodes = TypeParam::nodes();
+  const ReferencePoint<TypeParam> low = nodes.colwise().minCoeff().transpose(),
+                                  extent = nodes.colwise().maxCoeff().transpose() - low;
+  constexpr int samples = 200000;
+  int inside = 0;
+  for (int n = 0; n < samples; ++n) {
+    ReferencePoint<TypeParam> xi;
+    for (int a = 0; a < TypeParam::dim; ++a) xi[a] = low[a] + extent[a] * uniform(random);
+    inside += contains<TypeParam>(xi, 0);
+  }
+  // Five standard deviations of the count.
+  EXPECT_NEAR(static_cast<double>(inside) / samples * extent.prod(), TypeParam::reference_volume,
+              0.006 * extent.prod());
+}
+
+TYPED_TEST_P(ElementContract, InverseMapReturnsToThePoint) {
+  using E = TypeParam;
+  std::mt19937 random(4);
+  for (int n = 0; n < 500; ++n) {
+    const NodeMatrix<E> cell = contract_cell<E>(random, 0.08);
+    const InverseMap<E> map(cell);
+    ASSERT_FALSE(map.degenerate());
+    const ReferencePoint<E> xi = contract_point<E>(random), position = cell.transpose() * E::shape(xi);
+    const InverseMapResult<E> result = map(position);
+    ASSERT_TRUE(result.converged);
+    EXPECT_LT((result.xi - xi).norm(), 1e-11);
+  }
+}
+
+TYPED_TEST_P(ElementContract, PhongReproducesQuadraticsFromExactGradients) {
+  // On one distorted cell: wrong factors, signs, transposes and node orders all show.
+  using E = TypeParam;
+  constexpr int d = E::dim;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const NodeMatrix<E> cell = contract_cell<E>(random, 0.08);
+  CellBlocks<E> cells;
+  cells.vertices = cell;
+  auto& block = std::get<0>(cells.blocks);
+  block.cells.resize(1, E::num_nodes);
+  for (int i = 0; i < E::num_nodes; ++i) block.cells(0, i) = i;
+  constexpr int num_points = 100;
+  Points points(num_points, d);
+  for (int p = 0; p < num_points; ++p)
+    points.row(p) = (cell.transpose() * E::shape(contract_point<E>(random))).transpose();
+
+  const Eigen::Matrix<double, d, d> any = Eigen::Matrix<double, d, d>::NullaryExpr([&] { return uniform(random); });
+  const Eigen::Matrix<double, d, d> A = any + any.transpose();
+  const Eigen::Matrix<double, d, 1> b = Eigen::Matrix<double, d, 1>::NullaryExpr([&] { return uniform(random); });
+  const auto value = [&](const Eigen::Matrix<double, d, 1>& X) { return 0.5 * X.dot(A * X) + b.dot(X); };
+  Values<double> values(E::num_nodes, 1), gradients(E::num_nodes, d), out;
+  const WeightedPoints weights = embed(cells, points);
+  const Interpolant<double> phong(weights, named_rule("phong"), nullptr);
+  for (int i = 0; i < E::num_nodes; ++i) values(i, 0) = value(cell.row(i).transpose());
+  for (int i = 0; i < E::num_nodes; ++i)
+    gradients.row(i) = (A * cell.row(phong.active()[i]).transpose() + b).transpose();
+  phong.evaluate_given(values, gradients, {}, out);
+  for (int p = 0; p < num_points; ++p) EXPECT_NEAR(out(p, 0), value(points.row(p).transpose()), 1e-13);
+}
+
+REGISTER_TYPED_TEST_SUITE_P(ElementContract, SatisfiesTheConcept, ShapeIsOneAtItsNodeAndZeroAtOthers,
+                            WeightsSumToOneAndReproducePosition, PolynomialsAreTheShapeFunctions,
+                            GradientIsTheDerivativeOfShape, MarginIsZeroAtNodesAndPositiveAtTheCenter,
+                            FacetsLieOnTheBoundaryAndCoverEveryNode, ReferenceVolumeIsTheShareOfTheNodesBox,
+                            InverseMapReturnsToThePoint, PhongReproducesQuadraticsFromExactGradients);
+
+}  // namespace halfgrad
