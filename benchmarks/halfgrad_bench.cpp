@@ -1,20 +1,25 @@
-// halfgrad_bench WORKLOAD.bin ROUNDS MAX_POINTS: times frames, location and bind on one workload, one JSON line each.
-// Every round runs each operation once in turn, so that all see the same load of the machine; a frame is repeated
+// halfgrad_bench WORKLOAD ROUNDS MAX_POINTS [THREADS]: times frames, location and bind on one workload, one JSON line
+// each. Every round runs each operation once in turn, so that all see the same load of the machine; a frame is repeated
 // within its turn and the fastest repetition counts. Compare numbers of one round only.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <functional>
+#include <optional>
 
 #include "benchmarks/baselines.hpp"
 #include "benchmarks/workload.hpp"
 #include "framework/cell_locator.hpp"
 #include "framework/error.hpp"
 #include "framework/interpolant.hpp"
+#include "framework/point_selection.hpp"
 #include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
 #include "reconstruction/kriging.hpp"
@@ -44,24 +49,66 @@ double seconds(const std::function<void()>& run) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-void run(const std::string& path, int rounds, std::int64_t max_points, int threads) {
+// Values of which a tenth of the vertices, a part of the mesh, moves from frame to frame.
+class MovingTenth {
+ public:
+  MovingTenth(const Points& rest, const Values<float>& values) {
+    std::vector<double> sorted(rest.col(0).begin(), rest.col(0).end());
+    const auto cut = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 10);
+    std::nth_element(sorted.begin(), cut, sorted.end());
+    frames_ = {values, values};
+    for (Eigen::Index v = 0; v < rest.rows(); ++v)
+      if (rest(v, 0) < *cut) frames_[1].row(v).array() += 0.01f;
+  }
+  const Values<float>& next() { return frames_[static_cast<std::size_t>(frame_++ % 2)]; }
+
+ private:
+  std::array<Values<float>, 2> frames_;
+  int frame_ = 0;
+};
+
+// Greatest size of the process in bytes; 0 where the system does not tell.
+std::int64_t peak_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:")) return 1024 * std::atoll(line.c_str() + 6);
+  return 0;
+}
+
+void run(const std::string& name, int rounds, std::int64_t max_points, int threads) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  const Workload workload = read_workload(path, max_points);
+  const bool is_lattice = !name.ends_with(".bin");
+  const Workload workload = is_lattice ? lattice_workload(name, max_points) : read_workload(name, max_points);
   const Mesh& mesh = workload.mesh;
   // Points on the surface of a workload may be outside by a rounding.
   EmbedOptions nearest;
   nearest.outside = Outside::nearest;
+  const auto bind = [&] {
+    const Embedding located = embed(mesh, workload.points, nearest);
+    const Reconstruction stencils =
+        ChandrashekarGarg().reconstruct(CellGradients(mesh), active_vertices(mesh, located));
+    return Interpolant<float>(mesh, located, named_rule("phong"), &stencils);
+  };
+  const std::int64_t peak_before = peak_bytes();
+  const BindReport report = bind().report();
+  const std::int64_t peak_of_bind = peak_bytes() - peak_before;
+
   const Embedding embedding = embed(mesh, workload.points, nearest);
   const Reconstruction reconstruction =
       ChandrashekarGarg().reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
-  // Hessians of no meaning on the same stencils: what dual_taylor costs next to phong.
-  Reconstruction with_hessians = reconstruction;
-  with_hessians.stencils.hessian_weights.assign(6 * static_cast<std::size_t>(reconstruction.stencils.num_entries()), 0);
-  const auto bound = [&]<class Scalar>(Scalar, const char* rule) {
-    return Frame<Scalar>{Interpolant<Scalar>(mesh, embedding, named_rule(rule), &with_hessians), {}, {}};
+  const auto bound = [&]<class Scalar>(Scalar, const char* rule, const Embedding& points) {
+    return Frame<Scalar>{Interpolant<Scalar>(mesh, points, named_rule(rule), &reconstruction), {}, {}};
   };
-  auto linear = bound(float(), "linear"), phong = bound(float(), "phong"), hermite = bound(float(), "hermite");
-  auto dual_taylor = bound(float(), "dual_taylor");
+  auto linear = bound(float(), "linear", embedding), phong = bound(float(), "phong", embedding);
+  auto linear_user = bound(float(), "linear", embedding), phong_user = bound(float(), "phong", embedding);
+  auto phong_double = bound(double(), "phong", embedding);
+  auto updated = bound(float(), "phong", embedding);
+  // A tenth of the points: a part of the scene as a camera sees it, and a coarser level of detail.
+  const auto sorted = phong.interpolant.permutation();
+  std::vector<Index> every_tenth;
+  for (std::size_t s = 0; s < sorted.size(); s += 10) every_tenth.push_back(sorted[s]);
+  auto near_tenth = bound(float(), "phong", select_points(embedding, sorted.first(every_tenth.size())));
+  auto sparse_tenth = bound(float(), "phong", select_points(embedding, every_tenth));
   // What the stencils of other reconstructors cost.
   const auto bound_with = [&](const VertexGradientReconstructor& reconstructor, const char* rule) {
     const Reconstruction own = reconstructor.reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
@@ -69,51 +116,64 @@ void run(const std::string& path, int rounds, std::int64_t max_points, int threa
   };
   auto phong_lean = bound_with(Kriging({.patch = KrigingPatch::lean}), "phong");
   auto phong_kriging = bound_with(Kriging(), "phong"), phong_adaptive = bound_with(Adaptive(), "phong");
-  auto dual_taylor_kriging = bound_with(Kriging({.drift = KrigingDrift::cubic}), "dual_taylor");
-  auto linear_user = bound(float(), "linear"), phong_user = bound(float(), "phong");
-  auto phong_double = bound(double(), "phong");
   const Values<float> values = workload.deformed.cast<float>();
-  const ScalarLinear scalar_linear(mesh, embedding);
-  PaperStyle paper_style(mesh, embedding, workload.points);
-  std::vector<float> scalar_out(3 * static_cast<std::size_t>(embedding.num_points())), paper_out(scalar_out);
+  MovingTenth moving(mesh.vertices(), values);
 
   const Offset n = embedding.num_points();
   const int frames = std::max<int>(3, static_cast<int>(1'000'000 / std::max<Offset>(n, 1)));
-  const std::vector<Operation> operations = {
+  const std::size_t num_results = static_cast<std::size_t>(n) * static_cast<std::size_t>(mesh.gdim());
+  std::vector<float> copied(num_results), copy(num_results);
+  std::vector<Operation> operations = {
       {"linear", frames, [&] { linear.sorted(values); }},
       {"phong", frames, [&] { phong.sorted(values); }},
-      {"hermite", frames, [&] { hermite.sorted(values); }},
-      {"dual_taylor", frames, [&] { dual_taylor.sorted(values); }},
       {"phong_lean", frames, [&] { phong_lean.sorted(values); }},
       {"phong_kriging", frames, [&] { phong_kriging.sorted(values); }},
       {"phong_adaptive", frames, [&] { phong_adaptive.sorted(values); }},
-      {"dual_taylor_kriging", frames, [&] { dual_taylor_kriging.sorted(values); }},
       {"phong_double", frames, [&] { phong_double.sorted(workload.deformed); }},
       {"linear_user_order", frames, [&] { linear_user.user_order(values); }},
       {"phong_user_order", frames, [&] { phong_user.user_order(values); }},
-      {"scalar_linear", frames, [&] { scalar_linear.evaluate(values.data(), scalar_out.data()); }},
-      {"paper_style", 1, [&] { paper_style.evaluate(values.data(), paper_out.data()); }},
-      {"copy", frames, [&] { std::memmove(paper_out.data(), scalar_out.data(), scalar_out.size() * sizeof(float)); }},
+      {"phong_unchanged", frames, [&] { updated.interpolant.update_sorted(values, updated.out, updated.workspace); }},
+      {"phong_tenth_moved", frames,
+       [&] { updated.interpolant.update_sorted(moving.next(), updated.out, updated.workspace); }},
+      {"phong_near_tenth", frames, [&] { near_tenth.sorted(values); }},
+      {"phong_sparse_tenth", frames, [&] { sparse_tenth.sorted(values); }},
+      {"copy", frames, [&] { std::memmove(copy.data(), copied.data(), copy.size() * sizeof(float)); }},
       {"locate", 1, [&] { locate(mesh, workload.points, nearest.tolerance); }},
-      {"bind", 1,
-       [&] {
-         const Embedding located = embed(mesh, workload.points, nearest);
-         const Reconstruction stencils =
-             ChandrashekarGarg().reconstruct(CellGradients(mesh), active_vertices(mesh, located));
-         Interpolant<float>(mesh, located, named_rule("phong"), &stencils);
-       }},
+      {"bind", 1, [&] { bind(); }},
   };
+  const bool all_tetrahedra = mesh.blocks().size() == 1 && element_name(mesh, 0) == Tetrahedron::name;
+  std::optional<ScalarLinear> scalar_linear;
+  std::optional<PaperStyle> paper_style;
+  std::optional<Frame<float>> hermite, dual_taylor, dual_taylor_kriging;
+  if (all_tetrahedra) {
+    scalar_linear.emplace(mesh, embedding);
+    paper_style.emplace(mesh, embedding, workload.points);
+    hermite.emplace(bound(float(), "hermite", embedding));
+    // Hessians of no meaning on the same stencils: what dual_taylor costs next to phong.
+    Reconstruction with_hessians = reconstruction;
+    with_hessians.stencils.hessian_weights.assign(6 * static_cast<std::size_t>(reconstruction.stencils.num_entries()),
+                                                  0);
+    dual_taylor.emplace(
+        Frame<float>{Interpolant<float>(mesh, embedding, named_rule("dual_taylor"), &with_hessians), {}, {}});
+    dual_taylor_kriging.emplace(bound_with(Kriging({.drift = KrigingDrift::cubic}), "dual_taylor"));
+    operations.push_back({"dual_taylor_kriging", frames, [&] { dual_taylor_kriging->sorted(values); }});
+    operations.push_back({"hermite", frames, [&] { hermite->sorted(values); }});
+    operations.push_back({"dual_taylor", frames, [&] { dual_taylor->sorted(values); }});
+    operations.push_back({"scalar_linear", frames, [&] { scalar_linear->evaluate(values.data(), copied.data()); }});
+    operations.push_back({"paper_style", 1, [&] { paper_style->evaluate(values.data(), copied.data()); }});
+  }
   // A first pass over everything touches all memory, and shows that the contestants agree.
   for (const Operation& operation : operations) operation.run();
-  float difference = 0;
-  paper_style.evaluate(values.data(), paper_out.data());
-  for (std::size_t i = 0; i < paper_out.size(); ++i)
-    difference = std::max(difference, std::abs(paper_out[i] - phong_user.out.data()[i]));
-  const BindReport& report = phong.interpolant.report();
+  Values<float> reference = phong.interpolant.evaluate(values, {.kernel = Kernel::plain});
+  if (all_tetrahedra) {
+    paper_style->evaluate(values.data(), reference.data());
+  }
+  const float difference = (reference - phong_user.out).cwiseAbs().maxCoeff();
   fmt::print(
       "{{\"impl\":\"halfgrad\",\"op\":\"report\",\"n\":{},\"active_cells\":{},\"active_vertices\":{},"
-      "\"stencil_entries\":{},\"bytes\":{},\"difference_to_paper_style\":{:.3g}}}\n",
-      n, report.num_active_cells, report.num_active_vertices, report.num_stencil_entries, report.bytes, difference);
+      "\"stencil_entries\":{},\"bytes\":{},\"peak_of_bind\":{},\"difference_to_baseline\":{:.3g}}}\n",
+      n, report.num_active_cells, report.num_active_vertices, report.num_stencil_entries, report.bytes, peak_of_bind,
+      difference);
   for (int round = 0; round < rounds; ++round)
     for (const Operation& operation : operations) {
       double best = seconds(operation.run);
@@ -129,7 +189,7 @@ void run(const std::string& path, int rounds, std::int64_t max_points, int threa
 
 int main(int argc, char** argv) {
   if (argc < 4 || argc > 5) {
-    fmt::print(stderr, "usage: halfgrad_bench WORKLOAD.bin ROUNDS MAX_POINTS [THREADS]\n");
+    fmt::print(stderr, "usage: halfgrad_bench WORKLOAD.bin|ELEMENT:CELLS ROUNDS MAX_POINTS [THREADS]\n");
     return 2;
   }
   try {

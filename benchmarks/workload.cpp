@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <fstream>
+#include <random>
 #include <string_view>
 
+#include "experiments/lattice.hpp"
 #include "framework/error.hpp"
 
 namespace halfgrad::benchmarks {
@@ -38,6 +40,21 @@ Workload read_workload(const std::string& path, std::int64_t max_points) {
   if (max_points >= 0 && max_points < workload.points.rows())
     workload.points.conservativeResize(max_points, Eigen::NoChange);
   workload.mesh = Mesh(std::move(rest), {std::move(block)});
+  return workload;
+}
+
+Workload lattice_workload(const std::string& name, std::int64_t num_points) {
+  const std::size_t colon = name.find(':');
+  LatticeOptions options;
+  options.element = name.substr(0, colon);
+  options.cells.fill(colon == std::string::npos ? 0 : std::atoi(name.c_str() + colon + 1));
+  Workload workload;
+  workload.mesh = make_lattice(options);
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> uniform(1e-6, 1 - 1e-6);
+  workload.points = Points::NullaryExpr(num_points, workload.mesh.gdim(), [&] { return uniform(random); });
+  const Points& rest = workload.mesh.vertices();
+  workload.deformed = rest + 0.1 * (3 * rest).array().sin().matrix();
   return workload;
 }
 

@@ -16,7 +16,8 @@ CellGradients::CellGradients(const CellTable& table)
       vertex_cells_(transposed(table.cells, static_cast<Index>(table.vertices.rows()))),
       boundary_(table.boundary) {}
 
-CellGradient CellGradients::gradient(Index cell) const {
+// Flattened: small fixed-size products that are not inlined cost more than they compute.
+[[gnu::flatten]] CellGradient CellGradients::gradient(Index cell) const {
   if (table_ != nullptr) return table_->gradients[cell];
   return with_cell(*mesh_, cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
     return cell_gradient<E>(node_positions(*mesh_, block, row));

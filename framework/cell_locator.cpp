@@ -39,7 +39,7 @@ struct Bounds {
 
 // What a cell can hold: its nodes' bounds, grown by what the tolerance lets weights be negative.
 template <Element E>
-Bounds<E::dim> cell_bounds(const NodeMatrix<E>& positions, double tolerance) {
+[[gnu::flatten]] Bounds<E::dim> cell_bounds(const NodeMatrix<E>& positions, double tolerance) {
   Bounds<E::dim> bounds{positions.colwise().minCoeff().transpose(), positions.colwise().maxCoeff().transpose()};
   const Coordinates<E::dim> growth = E::num_nodes * tolerance * (bounds.high - bounds.low);
   bounds.low -= growth;
@@ -136,9 +136,9 @@ class PointGrid {
     }
   }
 
-  std::array<std::vector<double>, D> x;  // sorted coordinates, and num_lanes unused
+  std::array<std::vector<double>, D> x;  // sorted coordinates, and max_lanes unused
   std::vector<Index> id;                 // the caller's number of a sorted point
-  std::vector<double> margin;            // greatest so far
+  std::vector<double> margin;            // greatest so far, and max_lanes unused
   std::vector<Index> cell;               // of that margin; −1: none yet
 
  private:
@@ -201,10 +201,10 @@ PointGrid<D>::PointGrid(const Points& points, const CellStatistics<D>& cells, In
     ++first_[index + 1];
   }
   std::partial_sum(first_.begin(), first_.end(), first_.begin());
-  // Rows are tested num_lanes points at a time and read beyond their ends.
-  for (auto& axis : x) axis.resize(num_kept + num_lanes);
+  // Rows are tested several points at a time and read beyond their ends.
+  for (auto& axis : x) axis.resize(num_kept + max_lanes);
   id.resize(num_kept);
-  margin.assign(num_kept, -infinity);
+  margin.assign(num_kept + max_lanes, -infinity);
   cell.assign(num_kept, -1);
   for (Index p = 0; p < count; ++p) {
     if (box_of[p] < 0) continue;
@@ -238,52 +238,58 @@ double weight_blur(const NodeMatrix<E>& gradient, const NodeMatrix<E>& positions
   return 32 * std::numeric_limits<double>::epsilon() * blur;
 }
 
-// Tests a row of points against an affine cell; calls claimed(point) for those it takes.
-template <int D, class Function>
-void claim_row(PointGrid<D>& grid, Index begin, Index end, const WeightPlanes<D>& planes, double least, Index cell,
-               Function&& claimed) {
-  for (Index first = begin; first < end; first += num_lanes) {
-    std::array<const double*, D> x;
-    for (int a = 0; a < D; ++a) x[a] = grid.x[a].data() + first;
-    alignas(64) std::array<double, num_lanes> margins;
-    plane_margins(planes, x, margins.data());
-    const Index count = std::min<Index>(num_lanes, end - first);
-    for (Index i = 0; i < count; ++i) {
-      if (!(margins[i] >= least) || !(margins[i] > grid.margin[first + i])) continue;
-      grid.margin[first + i] = margins[i];
-      grid.cell[first + i] = cell;
-      claimed(first + i);
-    }
+// An affine cell ready for tests. Flattened: small fixed-size products that are not inlined cost more than they
+// compute.
+template <Element E>
+struct AffineCell {
+  InverseMap<E> map;
+  WeightPlanes<E::dim> planes;
+  double least = infinity;
+
+  [[gnu::flatten]] AffineCell(const NodeMatrix<E>& positions, double tolerance) : map(positions) {
+    if (map.degenerate()) return;
+    const NodeMatrix<E> gradient = map.weight_gradient();
+    planes = weight_planes<E>(gradient, positions);
+    least = -std::max(tolerance, weight_blur<E>(gradient, positions));
   }
-}
+  [[gnu::flatten]] ReferencePoint<E> xi(const ReferencePoint<E>& position) const { return map(position).xi; }
+};
+
+// What a thread needs from cell to cell.
+struct ClaimBuffers {
+  std::vector<PointRange> rows;
+  std::vector<Index> claimed;
+};
 
 // Tests one cell against the points of its rows, in the slices of the grid from first_slice to last_slice. A claim sets
 // ξ at once, while the cell's map is at hand: few points are claimed more than once.
 template <Element E>
 void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Index cell, double tolerance,
-           PointGrid<E::dim>& grid, int first_slice, int last_slice, Points& local) {
+           PointGrid<E::dim>& grid, int first_slice, int last_slice, ClaimBuffers& buffers, Points& local) {
   const NodeMatrix<E> positions = node_positions(mesh, block, row);
   const Bounds<E::dim> bounds = cell_bounds<E>(positions, tolerance);
   if (!grid.meets(bounds)) return;
-  std::optional<InverseMap<E>> map;
   if constexpr (E::affine) {
-    WeightPlanes<E::dim> planes;
-    double least = infinity;
+    buffers.rows.clear();
+    Index num_points = 0;
     grid.for_each_row(bounds, first_slice, last_slice, [&](Index begin, Index end) {
-      if (!map) {
-        map.emplace(positions);
-        if (!map->degenerate()) {
-          const NodeMatrix<E> gradient = map->weight_gradient();
-          planes = weight_planes<E>(gradient, positions);
-          least = -std::max(tolerance, weight_blur<E>(gradient, positions));
-        }
-      }
-      if (map->degenerate()) return;
-      claim_row<E::dim>(grid, begin, end, planes, least, cell, [&](Index p) {
-        local.row(grid.id[p]).template head<E::dim>() = (*map)(grid.position(p)).xi.transpose();
-      });
+      buffers.rows.push_back({begin, end});
+      num_points += end - begin;
     });
+    if (num_points == 0) return;
+    const AffineCell<E> affine(positions, tolerance);
+    if (affine.map.degenerate()) return;
+    if (static_cast<Index>(buffers.claimed.size()) < num_points) buffers.claimed.resize(num_points);
+    PlaneTest<E::dim> test{affine.planes, affine.least, {}, grid.margin.data()};
+    for (int a = 0; a < E::dim; ++a) test.x[a] = grid.x[a].data();
+    const Index num_claimed = raise_margins(test, buffers.rows, buffers.claimed.data());
+    for (Index i = 0; i < num_claimed; ++i) {
+      const Index p = buffers.claimed[i];
+      grid.cell[p] = cell;
+      local.row(grid.id[p]).template head<E::dim>() = affine.xi(grid.position(p)).transpose();
+    }
   } else {
+    std::optional<InverseMap<E>> map;
     grid.for_each_row(bounds, first_slice, last_slice, [&](Index begin, Index end) {
       for (Index p = begin; p < end; ++p) {
         const Coordinates<E::dim> position = grid.position(p);
@@ -348,6 +354,7 @@ CellLocations locate_in(const Mesh& mesh, const Points& points, double tolerance
   // wins by a greater margin only, which leaves ties to the lowest number. In one dimension the only axis is the rows'.
   const std::vector<Slab> slabs = make_slabs<D>(mesh, grid, tolerance);
   parallel_for(static_cast<std::int64_t>(slabs.size()), 1, [&](std::int64_t begin, std::int64_t end) {
+    ClaimBuffers buffers;
     for (std::int64_t s = begin; s < end; ++s) {
       std::size_t b = 0;
       for_each_block_of_dim<D>(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
@@ -356,7 +363,7 @@ CellLocations locate_in(const Mesh& mesh, const Points& points, double tolerance
             whole ? static_cast<Index>(block.cells.rows()) : static_cast<Index>(slabs[s].rows[b].size());
         for (Index i = 0; i < num_rows; ++i) {
           const Index row = whole ? i : slabs[s].rows[b][i];
-          claim<E>(mesh, block, row, first + row, tolerance, grid, slabs[s].first_slice, slabs[s].last_slice,
+          claim<E>(mesh, block, row, first + row, tolerance, grid, slabs[s].first_slice, slabs[s].last_slice, buffers,
                    result.local);
         }
         ++b;

@@ -1,5 +1,8 @@
 #include "framework/interpolant.hpp"
 
+#include <atomic>
+#include <cstring>
+
 #include "framework/interpolant_binding.hpp"
 #include "framework/kernels/formulas.hpp"
 
@@ -79,6 +82,45 @@ void pack_lines(const Scalar* positions, const Values<Scalar>& gradients, const 
       }
     }
   });
+}
+
+template <class Stencils, class Scalar>
+kernels::VertexStage<Scalar> vertex_stage(const Stencils& stencils, int num_weights, const std::array<Scalar, 9>& scale,
+                                          const Scalar* positions, Scalar* lines) {
+  return {num_weights, stencils.offsets.data(), stencils.neighbors.data(), stencils.weights.data(), scale, positions,
+          lines};
+}
+
+// `out` is that of the first point of all blocks.
+template <class Runs, class Scalar>
+kernels::PointStage<Scalar> point_stage(const Runs& runs, Eigen::Index columns, kernels::Recipe recipe,
+                                        const Scalar* lines, double tolerance, Scalar* out) {
+  return {.num_columns = static_cast<int>(columns),
+          .recipe = recipe,
+          .nodes = runs.nodes.data()->data(),
+          .rest = runs.rest.data()->data()->data(),
+          .first = runs.first.data(),
+          .first_chunk = runs.first_chunk.data(),
+          .chunks = runs.chunks.data(),
+          .local = runs.local.data(),
+          .extrapolates = runs.extrapolates.empty() ? nullptr : runs.extrapolates.data(),
+          .affine = runs.affine.data(),
+          .lines = lines,
+          .tolerance = static_cast<Scalar>(tolerance),
+          .out = out + static_cast<Offset>(runs.base) * columns};
+}
+
+bool is_fast_width(Eigen::Index columns) { return columns >= 1 && columns <= kernels::max_fast_columns; }
+
+// Calls f(begin, end) for each range of consecutive items in [begin, end) that are chosen.
+template <class Chosen, class Function>
+void for_each_chosen_range(Index begin, Index end, Chosen&& chosen, Function&& f) {
+  while (begin < end) {
+    while (begin < end && !chosen(begin)) ++begin;
+    const Index first = begin;
+    while (begin < end && chosen(begin)) ++begin;
+    if (first < begin) f(first, begin);
+  }
 }
 
 // Calls f with a std::integral_constant of the number of columns where it is 1, 2 or 3, else of −1.
@@ -214,9 +256,9 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
                                          const Values<Scalar>* hessians, const EvaluateOptions& options,
                                          Workspace<Scalar>& workspace, Scalar* out) const {
   const FastRule fast = fast_rule(rule);
-  const bool fast_columns = values.cols() >= 1 && values.cols() <= kernels::max_fast_columns;
+  workspace.holds = nullptr;
   const auto is_fast = [&]<class E>(const Runs<E>&) {
-    return kernels::has_fast_path<E>(fast.recipe) && options.kernel == Kernel::fast && fast_columns;
+    return kernels::has_fast_path<E>(fast.recipe) && options.kernel == Kernel::fast && is_fast_width(values.cols());
   };
   // Where a point lies outside a cell that is no simplex, its value is not the cell's polynomial.
   const auto has_plain_runs = [&]<class E>(const Runs<E>& runs) {
@@ -258,9 +300,7 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
       lines = target;
       const auto scale = line_scale<Scalar>(fast, gdim);
       if (from_stencils) {
-        const kernels::VertexStage<Scalar> stage{
-            num_weights, stencils.offsets.data(), stencils.neighbors.data(), stencils.weights.data(), scale, positions,
-            target};
+        const auto stage = vertex_stage(stencils, num_weights, scale, static_cast<const Scalar*>(positions), target);
         parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
           stage.run(static_cast<Index>(begin), static_cast<Index>(end));
         });
@@ -280,20 +320,7 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
       });
     };
     if (!is_fast(runs)) return plain(begin, end);
-    const kernels::PointStage<Scalar> stage{
-        .num_columns = static_cast<int>(values.cols()),
-        .recipe = fast.recipe,
-        .nodes = runs.nodes.data()->data(),
-        .rest = runs.rest.data()->data()->data(),
-        .first = runs.first.data(),
-        .first_chunk = runs.first_chunk.data(),
-        .chunks = runs.chunks.data(),
-        .local = runs.local.data(),
-        .extrapolates = runs.extrapolates.empty() ? nullptr : runs.extrapolates.data(),
-        .affine = runs.affine.data(),
-        .lines = lines,
-        .tolerance = static_cast<Scalar>(options.tolerance),
-        .out = out + static_cast<Offset>(runs.base) * values.cols()};
+    const auto stage = point_stage(runs, values.cols(), fast.recipe, lines, options.tolerance, out);
     stage.template run<E>(begin, end);
     if (!has_plain_runs(runs)) return;
     for (Index run = begin; run < end; ++run)
@@ -303,6 +330,80 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
     weighted_point_stage(values, gradients != nullptr ? *gradients : none, hessians != nullptr ? *hessians : none, out);
   std::fill(out + static_cast<Offset>(num_served) * values.cols(),
             out + static_cast<Offset>(report.num_points) * values.cols(), std::numeric_limits<Scalar>::quiet_NaN());
+}
+
+template <class Scalar>
+bool Interpolant<Scalar>::Binding::all_fast(Eigen::Index columns, Kernel kernel) const {
+  if (blended || weighted.num_points() > 0 || kernel != Kernel::fast || !is_fast_width(columns)) return false;
+  return std::all_of(blocks.begin(), blocks.end(), [&](const AnyRuns& any) {
+    return std::visit(
+        [&]<class E>(const Runs<E>& runs) {
+          return kernels::has_fast_path<E>(fast_rule(rule).recipe) && (E::affine || runs.extrapolates.empty());
+        },
+        any);
+  });
+}
+
+template <class Scalar>
+Index Interpolant<Scalar>::Binding::update(const Values<Scalar>& values, const EvaluateOptions& options,
+                                           Workspace<Scalar>& workspace, Scalar* out) const {
+  const FastRule fast = fast_rule(rule);
+  const int num_weights = kernels::num_weights(fast.recipe, gdim);
+  const auto count = num_weights > 0 ? static_cast<Offset>(vertices.size()) : num_active;
+  auto* const positions = reinterpret_cast<Scalar*>(workspace.positions.data());
+  std::vector<std::uint8_t>& moved = workspace.moved;
+  moved.assign(static_cast<std::size_t>(count + num_active), 0);
+  const auto columns = static_cast<std::size_t>(values.cols());
+  std::atomic<bool> any_moved = false;
+  parallel_for(count, vertex_grain(count), [&](std::int64_t begin, std::int64_t end) {
+    bool any = false;
+    for (std::int64_t v = begin; v < end; ++v) {
+      const Scalar* from = values.data() + static_cast<Offset>(vertices[v]) * values.cols();
+      if (std::memcmp(positions + 4 * v, from, columns * sizeof(Scalar)) == 0) continue;
+      std::copy_n(from, columns, positions + 4 * v);
+      moved[v] = 1;
+      any = true;
+    }
+    if (any) any_moved = true;
+  });
+  if (!any_moved) return 0;
+
+  // Lines depend on the stencils' vertices too.
+  const std::uint8_t* changed = moved.data();
+  const Scalar* lines = positions;
+  if (num_weights > 0) {
+    auto* const target = reinterpret_cast<Scalar*>(workspace.lines.data());
+    lines = target;
+    std::uint8_t* const stale = moved.data() + count;
+    changed = stale;
+    const auto stage = vertex_stage(stencils, num_weights, line_scale<Scalar>(fast, gdim),
+                                    static_cast<const Scalar*>(positions), target);
+    parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
+      for (std::int64_t r = begin; r < end; ++r) {
+        std::uint8_t any = moved[r];
+        for (Offset e = stencils.offsets[r]; e < stencils.offsets[r + 1]; ++e) any |= moved[stencils.neighbors[e]];
+        stale[r] = any;
+      }
+      for_each_chosen_range(
+          static_cast<Index>(begin), static_cast<Index>(end), [&](Index r) { return stale[r] != 0; },
+          [&](Index first, Index last) { stage.run(first, last); });
+    });
+  }
+
+  std::atomic<Index> num_evaluated = 0;
+  for_each_range([&]<class AnyElementRuns>(const AnyElementRuns& runs, Index begin, Index end) {
+    using E = typename AnyElementRuns::element;
+    const auto stage = point_stage(runs, values.cols(), fast.recipe, lines, options.tolerance, out);
+    const auto is_stale = [&](Index run) {
+      return std::any_of(runs.nodes[run].begin(), runs.nodes[run].end(),
+                         [&](Index node) { return changed[node] != 0; });
+    };
+    for_each_chosen_range(begin, end, is_stale, [&](Index first, Index last) {
+      stage.template run<E>(first, last);
+      num_evaluated += last - first;
+    });
+  });
+  return num_evaluated;
 }
 
 template <class Scalar>
@@ -358,6 +459,24 @@ void Interpolant<Scalar>::evaluate_sorted(const Values<Scalar>& values, Values<S
   if (binding.rule.needs_gradients()) binding.require_gradients();
   out.resize(num_points(), values.cols());
   binding.frame(values, nullptr, nullptr, options, workspace, out.data());
+}
+
+template <class Scalar>
+Index Interpolant<Scalar>::update_sorted(const Values<Scalar>& values, Values<Scalar>& out,
+                                         Workspace<Scalar>& workspace, const EvaluateOptions& options) const {
+  const Binding& binding = *binding_;
+  binding.require_values(values);
+  if (workspace.holds == &binding && workspace.held_columns == values.cols() &&
+      workspace.held_tolerance == options.tolerance && options.kernel == Kernel::fast && out.rows() == num_points() &&
+      out.cols() == values.cols())
+    return binding.update(values, options, workspace, out.data());
+  evaluate_sorted(values, out, workspace, options);
+  if (binding.all_fast(values.cols(), options.kernel)) {
+    workspace.holds = &binding;
+    workspace.held_columns = values.cols();
+    workspace.held_tolerance = options.tolerance;
+  }
+  return report().num_active_cells;
 }
 
 template <class Scalar>

@@ -44,6 +44,11 @@ struct Workspace {
   Values<Scalar> gradients, hessians;                ///< of the plain path
   std::vector<kernels::CacheLine> positions, lines;  ///< of the fast path
   Values<Scalar> sorted;                             ///< results before they go to the caller's order
+
+  std::vector<std::uint8_t> moved;  ///< of update_sorted: vertices whose values changed, then those whose lines did
+  const void* holds = nullptr;      ///< the binding whose last update_sorted the buffers hold
+  Eigen::Index held_columns = 0;
+  double held_tolerance = 0;
 };
 
 /// The vertices of the cells that hold points, in the order in which an interpolant numbers them: by first use along
@@ -92,6 +97,13 @@ class Interpolant {
   /// caller who numbers points by permutation() before bind gets this speed from evaluate.
   void evaluate_sorted(const Values<Scalar>& values, Values<Scalar>& out, Workspace<Scalar>& workspace,
                        const EvaluateOptions& options = {}) const;
+
+  /// evaluate_sorted for a frame that differs little from the last one: cells none of whose vertices' values and
+  /// stencils changed, bit for bit, keep their rows of `out`. `out` and `workspace` must be as the last call of
+  /// update_sorted with the same options left them, or new. Returns the number of cells evaluated: all of them in the
+  /// first call and where no fast path serves the mesh and the rule.
+  Index update_sorted(const Values<Scalar>& values, Values<Scalar>& out, Workspace<Scalar>& workspace,
+                      const EvaluateOptions& options = {}) const;
 
   /// The vertex stage alone: F (and Q) of the active vertices in binding order, #active × (#columns · gdim), row =
   /// component, column = axis.

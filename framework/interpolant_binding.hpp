@@ -183,6 +183,11 @@ struct Interpolant<Scalar>::Binding {
   void frame(const Values<Scalar>& values, const Values<Scalar>* gradients, const Values<Scalar>* hessians,
              const EvaluateOptions& options, Workspace<Scalar>& workspace, Scalar* out) const;
   void to_caller_order(const Values<Scalar>& sorted, Values<Scalar>& out) const;
+  // Whether every cell goes the fast path alone.
+  bool all_fast(Eigen::Index columns, Kernel kernel) const;
+  // The cells that changed since the workspace's last frame; their number.
+  Index update(const Values<Scalar>& values, const EvaluateOptions& options, Workspace<Scalar>& workspace,
+               Scalar* out) const;
 };
 
 }  // namespace halfgrad

@@ -14,11 +14,25 @@ namespace halfgrad {
 
 namespace {
 
-std::vector<FacetKey> sorted_facets(const Mesh& mesh) {
+std::vector<FacetKey> all_facets(const Mesh& mesh) {
   std::vector<FacetKey> facets;
   for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) { append_facets(block, facets); });
-  std::sort(facets.begin(), facets.end());
   return facets;
+}
+
+// Few facets share their lowest vertex: counting brings those together, and each such group is sorted.
+std::vector<FacetKey> sorted(const std::vector<FacetKey>& facets, Index num_vertices) {
+  std::vector<Offset> next(static_cast<std::size_t>(num_vertices) + 1, 0);
+  for (const FacetKey& key : facets) ++next[key[0] + 1];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::vector<FacetKey> result(facets.size());
+  for (const FacetKey& key : facets) result[next[key[0]]++] = key;
+  // Each place has moved to the start of the next group.
+  for (Offset begin = 0; const Offset end : next) {
+    std::sort(result.begin() + begin, result.begin() + end);
+    begin = end;
+  }
+  return result;
 }
 
 // Calls f(key, count) for each distinct facet.
@@ -146,9 +160,8 @@ IndexTable vertex_cells(const Mesh& mesh) {
 }
 
 std::vector<char> boundary_vertices(std::vector<FacetKey> facets, Index num_vertices) {
-  std::sort(facets.begin(), facets.end());
   std::vector<char> boundary(num_vertices, 0);
-  for_each_facet(facets, [&](const FacetKey& key, std::size_t count) {
+  for_each_facet(sorted(facets, num_vertices), [&](const FacetKey& key, std::size_t count) {
     if (count == 2) return;
     for (Index v : key)
       if (v != std::numeric_limits<Index>::max()) boundary[v] = 1;
@@ -157,7 +170,7 @@ std::vector<char> boundary_vertices(std::vector<FacetKey> facets, Index num_vert
 }
 
 std::vector<char> boundary_vertices(const Mesh& mesh) {
-  return boundary_vertices(sorted_facets(mesh), mesh.num_vertices());
+  return boundary_vertices(all_facets(mesh), mesh.num_vertices());
 }
 
 MeshReport inspect(const Mesh& mesh) {
@@ -205,7 +218,7 @@ MeshReport inspect(const Mesh& mesh) {
       quality_sum += quality;
     }
   });
-  for_each_facet(sorted_facets(mesh), [&](const FacetKey&, std::size_t count) {
+  for_each_facet(sorted(all_facets(mesh), mesh.num_vertices()), [&](const FacetKey&, std::size_t count) {
     if (count == 1) ++report.num_boundary_facets;
     if (count > 2) ++report.num_nonmanifold_facets;
   });

@@ -1,12 +1,15 @@
-// The margins of points in a simplex, several points at once: the inner loop of point location.
+// Which points of some ranges a simplex holds, several points at once: the inner loop of point location.
 #pragma once
 
 #include <array>
+#include <span>
+
+#include "framework/types.hpp"
 
 namespace halfgrad {
 
-/// Number of points in one call of plane_margins.
-inline constexpr int num_lanes = 8;
+/// Numbers by which the arrays of a PlaneTest are longer than their content: vectors are read whole.
+inline constexpr int max_lanes = 8;
 
 /// The weights of a simplex as planes: β_i = at_first_i + gradient_i · (X − first).
 template <int D>
@@ -16,10 +19,25 @@ struct WeightPlanes {
   std::array<double, D> first;
 };
 
-/// The least weight of num_lanes points, given as num_lanes values a coordinate. The operations and their order are the
-/// same for every instruction set, without fused multiply-adds, and so are the bits of the result.
-void plane_margins(const WeightPlanes<1>& planes, const std::array<const double*, 1>& x, double* margins);
-void plane_margins(const WeightPlanes<2>& planes, const std::array<const double*, 2>& x, double* margins);
-void plane_margins(const WeightPlanes<3>& planes, const std::array<const double*, 3>& x, double* margins);
+/// A simplex against points, which are an array a coordinate.
+template <int D>
+struct PlaneTest {
+  WeightPlanes<D> planes;
+  double least;                    ///< the least weight of a point that the simplex holds
+  std::array<const double*, D> x;  ///< [point]
+  double* margin;                  ///< [point] the greatest least weight of any simplex so far
+};
+
+/// A range of points.
+struct PointRange {
+  Index begin, end;
+};
+
+/// Raises margin[p] to the point's least weight where that is at least `least` and greater than margin[p]. Writes the
+/// points raised to `raised`, which has room for all points of the ranges, and returns their number. The operations and
+/// their order are the same for every instruction set, without fused multiply-adds, and so are the bits of the result.
+Index raise_margins(const PlaneTest<1>& test, std::span<const PointRange> ranges, Index* raised);
+Index raise_margins(const PlaneTest<2>& test, std::span<const PointRange> ranges, Index* raised);
+Index raise_margins(const PlaneTest<3>& test, std::span<const PointRange> ranges, Index* raised);
 
 }  // namespace halfgrad
