@@ -1,8 +1,7 @@
 #include "apps/carrier.hpp"
 
 #include <memory>
-
-#include "framework/error.hpp"
+#include <set>
 
 namespace halfgrad::app {
 
@@ -51,7 +50,14 @@ template <class Scalar>
 Carrier<Scalar> make_carrier(const Binding& binding, const InterpolationRule& rule) {
   const Reconstruction* given = binding.reconstruction ? &*binding.reconstruction : nullptr;
   if (binding.grid) return carrier_of(Interpolant<Scalar>(*binding.grid, binding.embedding, rule, given));
-  if (binding.on_surface()) return carrier_of(SurfaceInterpolant<Scalar>(binding.mesh, binding.feet, rule, *given));
+  if (binding.on_surface()) {
+    Carrier<Scalar> carrier = carrier_of(SurfaceInterpolant<Scalar>(binding.mesh, binding.feet, rule, *given));
+    // Weights name no cells; their feet do.
+    const std::set<Index> cells(binding.feet.cells.begin(), binding.feet.cells.end());
+    carrier.report.num_cells = binding.mesh.num_cells();
+    carrier.report.num_active_cells = static_cast<Index>(cells.size());
+    return carrier;
+  }
   return carrier_of(Interpolant<Scalar>(binding.mesh, binding.embedding, rule, given));
 }
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "apps/carrier.hpp"
 #include "apps/deform.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"

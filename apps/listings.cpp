@@ -111,12 +111,16 @@ void info(const std::filesystem::path& path, bool as_json) {
     fmt::print("{}\n", facts.dump(2));
     return;
   }
-  fmt::print("{}: {} vertices in {} dimensions, {} cells\n", path.string(), mesh.num_vertices(), mesh.gdim(),
-             mesh.num_cells());
+  fmt::print("{}: {} vertices in {} dimensions, {} cells{}\n", path.string(), mesh.num_vertices(), mesh.gdim(),
+             mesh.num_cells(), mesh.is_surface() ? " of a surface" : "");
   for (const json& block : facts["blocks"])
     fmt::print("  {:<26} {}\n", block["element"].get<std::string>(), block["cells"].get<Index>());
   fmt::print("  {:<26} ({:.6g}) to ({:.6g})\n", "bounds", fmt::join(low, ", "), fmt::join(high, ", "));
-  fmt::print("  {:<26} {:.6g}\n", mesh.gdim() == 2 ? "area" : mesh.gdim() == 1 ? "length" : "volume", report.volume);
+  fmt::print("  {:<26} {:.6g}\n",
+             mesh.gdim() == 2 || mesh.is_surface() ? "area"
+             : mesh.gdim() == 1                    ? "length"
+                                                   : "volume",
+             report.volume);
   fmt::print("  {:<26} {:.4g} to {:.4g}, mean {:.4g}\n", "edges", report.min_edge, report.max_edge, report.mean_edge);
   fmt::print("  {:<26} least {:.3g}, mean {:.3g} (|det J| over edge lengths, 1 is best)\n", "quality",
              report.min_quality, report.mean_quality);

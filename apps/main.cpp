@@ -199,7 +199,8 @@ int dispatch(int argc, char** argv) {
       ->add_option("--field", options.fields,
                    "Also carry a field of the vertices: NAME of point data in the frame files or the rest mesh, or "
                    "NAME=FILE.npy")
-      ->take_all();
+      ->take_all()
+      ->type_name("NAME");
   deform_app->add_option("--precision", options.precision, "float or double")->capture_default_str();
   deform_app->add_option("--first", options.first, "First frame, from 0")->capture_default_str();
   deform_app->add_option("--last", options.last, "Last frame (default: the last one)")->check(CLI::NonNegativeNumber);

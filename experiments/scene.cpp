@@ -67,11 +67,11 @@ json encoded_positions(const Points& points) {
   return array;
 }
 
-/// Vertex pairs: in space the edges of the boundary, in the plane and on the line those of every cell.
+/// Vertex pairs: of bodies in space the edges of the boundary, of others those of every cell.
 std::vector<std::uint32_t> coarse_edges(const Mesh& mesh) {
   std::set<std::pair<Index, Index>> edges;
   const auto add = [&](Index a, Index b) { edges.emplace(std::min(a, b), std::max(a, b)); };
-  if (mesh.gdim() == 3) {
+  if (mesh.gdim() == 3 && !mesh.is_surface()) {
     for (const CellFacet& side : boundary_facets(mesh, std::vector<char>(mesh.num_cells(), 0)))
       with_cell(mesh, side.cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
         const Facet& facet = E::facets[side.facet];
@@ -110,6 +110,11 @@ std::vector<std::uint32_t> triangles(const IndexTable& faces) {
 
 SceneRecorder::SceneRecorder(const Mesh& mesh, const PointCloud& cloud, std::size_t num_frames, std::size_t num_rules)
     : scene_(std::make_unique<json>(json::object())), wanted_(num_frames, 1) {
+  if (mesh.gdim() > 3) {
+    is_omitted_ = true;
+    (*scene_)["omitted"] = fmt::format("There is no view of {} dimensions.", mesh.gdim());
+    return;
+  }
   // 16-bit coordinates and a float error a rule, coordinates of the truth and of the vertices.
   const auto bytes = [&](std::size_t points) {
     return points * (num_rules * 10 + 6) + static_cast<std::size_t>(mesh.num_vertices()) * 6;

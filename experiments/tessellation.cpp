@@ -55,9 +55,10 @@ class Tessellator {
 }  // namespace
 
 PointCloud tessellation(const Mesh& mesh, int subdivisions) {
-  if (mesh.gdim() < 2) raise("a tessellation needs a mesh of the plane or of space");
+  if (mesh.gdim() != 2 && mesh.gdim() != 3)
+    raise("a tessellation needs a mesh of the plane or of space, but this one has dimension {}", mesh.gdim());
   Tessellator tessellator(mesh, subdivisions);
-  if (mesh.gdim() == 2) {
+  if (mesh.gdim() == 2 || mesh.is_surface()) {
     for (Index cell = 0; cell < mesh.num_cells(); ++cell) tessellator.add_polygon(mesh.cell_vertices(cell));
     return tessellator.finish();
   }

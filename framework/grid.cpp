@@ -208,11 +208,18 @@ Index Grid::neighbor(Index vertex, int axis, int side) const {
 Mesh Grid::mesh_of(std::span<const Index> cells, std::vector<Index>& vertices) const {
   const int num_nodes = 1 << gdim();
   std::vector<Index> corners(cells.size() * static_cast<std::size_t>(num_nodes));
-  for (std::size_t c = 0; c < cells.size(); ++c)
-    std::copy_n(cell_vertices(cells[c]).data(), num_nodes, corners.data() + c * static_cast<std::size_t>(num_nodes));
-  vertices = corners;
-  std::sort(vertices.begin(), vertices.end());
-  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  std::vector<Index> number(static_cast<std::size_t>(num_vertices_), -1);
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    const std::array<Index, 8> found = cell_vertices(cells[c]);
+    std::copy_n(found.data(), num_nodes, corners.data() + c * static_cast<std::size_t>(num_nodes));
+    for (int i = 0; i < num_nodes; ++i) number[found[i]] = 0;
+  }
+  vertices.clear();
+  for (Index v = 0; v < num_vertices_; ++v) {
+    if (number[v] < 0) continue;
+    number[v] = static_cast<Index>(vertices.size());
+    vertices.push_back(v);
+  }
   Points positions(static_cast<Eigen::Index>(vertices.size()), gdim());
   for (std::size_t v = 0; v < vertices.size(); ++v)
     positions.row(static_cast<Eigen::Index>(v)) = position(vertices[v]).transpose();
@@ -220,9 +227,7 @@ Mesh Grid::mesh_of(std::span<const Index> cells, std::vector<Index>& vertices) c
   with_box_element(gdim(), [&]<Element E>() {
     ElementBlock<E> block;
     block.cells.resize(static_cast<Eigen::Index>(cells.size()), E::num_nodes);
-    for (std::size_t i = 0; i < corners.size(); ++i)
-      block.cells.data()[i] =
-          static_cast<Index>(std::lower_bound(vertices.begin(), vertices.end(), corners[i]) - vertices.begin());
+    for (std::size_t i = 0; i < corners.size(); ++i) block.cells.data()[i] = number[corners[i]];
     any = std::move(block);
   });
   return Mesh(std::move(positions), {std::move(any)});

@@ -2,6 +2,8 @@
 # sanitizer run.
 add_test(NAME layering COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/layering.sh ${PROJECT_SOURCE_DIR})
 add_test(NAME layering_finds_violations COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/layering_test.sh)
+# Links between the repository's pages.
+add_test(NAME links COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/docs/links_test.py ${PROJECT_SOURCE_DIR})
 
 # Every header compiles alone: one translation unit each, built by the test and not before.
 file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}

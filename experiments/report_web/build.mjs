@@ -15,7 +15,8 @@ const result = await build({
   format: "iife",
   charset: "ascii",
   target: "es2020",
-  legalComments: "none",
+  // The licences of the packages go with their code into every page.
+  legalComments: "eof",
   loader: { ".css": "text" },
   nodePaths: [join(here, "node_modules")],
 });

@@ -56,7 +56,7 @@ const std::vector<Format>& formats() {
   static const std::vector<Format> table = {
       {"Gmsh", {".msh"}, true, read_gmsh, nullptr, nullptr},
       {"legacy VTK", {".vtk"}, true, read_vtk_legacy, nullptr, nullptr},
-      {"VTK XML", {".vtu", ".vtp"}, true, read_vtk_xml, nullptr, nullptr},
+      {"VTK XML", {".vtu", ".vtp", ".pvtu"}, true, read_vtk_xml, nullptr, nullptr},
       {"VTK grid", {".vti", ".vtr"}, true, read_vtk_grid_cells, nullptr, nullptr, read_vtk_grid},
       {"MEDIT", {".mesh"}, true, read_medit, nullptr, nullptr},
       {"TetGen", {".node", ".ele"}, true, read_tetgen, nullptr, nullptr},

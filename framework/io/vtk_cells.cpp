@@ -15,6 +15,14 @@ struct OtherOrder {
 constexpr OtherOrder other_orders[] = {
     {8, 9, 4, {0, 1, 3, 2}}, {11, 12, 8, {0, 1, 3, 2, 4, 5, 7, 6}}, {13, 13, 6, {0, 2, 1, 3, 5, 4}}};
 
+// Lagrange and Bézier cells of degree one, which DOLFINx writes: the element with these nodes, in its own order.
+struct FirstDegree {
+  int lagrange_id, bezier_id, element_id;
+  std::size_t num_nodes;
+};
+constexpr FirstDegree first_degrees[] = {{68, 75, 3, 2},  {69, 76, 5, 3},  {70, 77, 9, 4}, {71, 78, 10, 4},
+                                         {72, 79, 12, 8}, {73, 80, 13, 6}, {74, 81, 14, 5}};
+
 int usual_type(std::int64_t type, std::size_t num_nodes) {
   if (type == 7 && num_nodes == 3) return 5;
   if (type == 7 && num_nodes == 4) return 9;
@@ -43,6 +51,9 @@ void VtkCells::add_to(Geometry& geometry, const std::vector<std::int64_t>& types
         type = other.element_id;
         break;
       }
+    for (const FirstDegree& cell_type : first_degrees)
+      if ((type == cell_type.lagrange_id || type == cell_type.bezier_id) && cell.size() == cell_type.num_nodes)
+        type = cell_type.element_id;
     // A negative number must not become valid by the shift.
     for (std::int64_t& node : cell)
       if (node >= 0 && node < (std::int64_t{1} << 40)) node += first_vertex;

@@ -26,8 +26,8 @@ struct VtkCells {
   std::vector<std::int64_t> offsets, nodes;
 
   /// Appends them to a geometry, with node numbers raised by `first_vertex`. Pixels and voxels become quadrilaterals
-  /// and hexahedra; polygons of three and four nodes triangles and quadrilaterals. Throws Error where offsets decrease
-  /// or leave the list, or where types are not one a cell.
+  /// and hexahedra; polygons of three and four nodes triangles and quadrilaterals; Lagrange and Bezier cells of degree
+  /// one the plain ones. Throws Error where offsets decrease or leave the list, or where types are not one a cell.
   void add_to(Geometry& geometry, const std::vector<std::int64_t>& types, std::int64_t first_vertex = 0) const;
   /// The same with one type for all.
   void add_to(Geometry& geometry, int type, std::int64_t first_vertex = 0) const;

@@ -47,12 +47,22 @@ void append_arrays(const VtkXmlFile& file, pugi::xml_node piece, std::int64_t nu
   }
 }
 
-}  // namespace
+// The file that a parallel one consists of, relative to it.
+std::filesystem::path only_piece(const VtkXmlFile& file, pugi::xml_node data, const std::filesystem::path& path) {
+  const auto pieces = data.children("Piece");
+  const auto count = std::distance(pieces.begin(), pieces.end());
+  if (count != 1)
+    file.fail(data, fmt::format("found {} pieces, expected one: pieces repeat the vertices they share, so merge them "
+                                "first (ParaView: Merge Blocks, or a run with one process)",
+                                count));
+  const std::filesystem::path piece = data.child("Piece").attribute("Source").as_string();
+  if (piece.extension() != ".vtu" && piece.extension() != ".vtp")
+    file.fail(data, fmt::format("found the piece \"{}\", expected a .vtu or .vtp file", shown(piece.string())));
+  return path.parent_path() / piece;
+}
 
-Geometry read_vtk_xml(const std::filesystem::path& path) {
-  const InputFile input(path);
-  const VtkXmlFile file(input);
-  const std::string name = path.string();
+Geometry read_serial(const InputFile& input, const VtkXmlFile& file) {
+  const std::string name = input.path().string();
   const std::string_view type = file.root().attribute("type").as_string();
   const bool is_grid = type == "UnstructuredGrid";
   if (!is_grid && type != "PolyData")
@@ -95,6 +105,17 @@ Geometry read_vtk_xml(const std::filesystem::path& path) {
   std::erase_if(geometry.arrays,
                 [&](const PointArray& array) { return array.values.rows() != geometry.vertices.rows(); });
   return geometry;
+}
+
+}  // namespace
+
+Geometry read_vtk_xml(const std::filesystem::path& path) {
+  const InputFile input(path);
+  const VtkXmlFile file(input);
+  const std::string type = file.root().attribute("type").as_string();
+  if (type != "PUnstructuredGrid" && type != "PPolyData") return read_serial(input, file);
+  const InputFile piece(only_piece(file, file.child(file.root(), type.c_str()), path));
+  return read_serial(piece, VtkXmlFile(piece));
 }
 
 }  // namespace halfgrad

@@ -13,6 +13,7 @@
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
 #include "framework/io/mesh_file.hpp"
+#include "framework/io/npy.hpp"
 
 namespace halfgrad {
 namespace {
@@ -36,6 +37,7 @@ class RestShapes : public testing::Test {
     sink->write(points);
     sink->finish();
   }
+  void write_points(const std::string& name, const Points& points) const { write_npy(directory / name, points); }
   Values<double> read_array(const std::string& name) const {
     Values<double> values;
     open_frames(in(name))->read(0, values);
@@ -69,7 +71,7 @@ TEST_F(RestShapes, GridsCarryPoints) {
   write_array("frames.npy", parabola(rest));
   Points points(3, 3);
   points << 1.2, 0.3, 1.7, 2.5, 1, 0, 1.9, 1.4, 0.6;
-  write_array("points.npy", points);
+  write_points("points.npy", points);
   const std::string arguments = "deform --rest " + in("grid.vti") + " --frames " + in("frames.npy") + " --points " +
                                 in("points.npy") + " --out " + in("out.npy") + " --report " + in("report.json");
   ASSERT_EQ(run(arguments), 0) << output;
@@ -91,7 +93,7 @@ TEST_F(RestShapes, SurfacesCarryPointsBesideThem) {
   write_array("frames.npy", rest * turn.transpose());
   Points points(4, 3);
   points << 0.4, 0.5, 0.5, 1, 0.2, 0.31, 1.6, 0.9, -0.2, 2.5, 1.5, 0.1;
-  write_array("points.npy", points);
+  write_points("points.npy", points);
   const std::string arguments =
       "deform --rest " + in("cloth.obj") + " --points " + in("points.npy") + " --out " + in("out.npy") + " --frames ";
   for (const char* options : {"", " --interpolant linear", " --reconstructor kriging --precision float --gradients"}) {

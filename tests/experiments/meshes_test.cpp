@@ -40,7 +40,8 @@ TEST(Lattice, EveryPatternFillsTheBoxRegularOrNot) {
         expect_valid(mesh);
         const double volume = 2;
         // Quadrilateral faces are warped by jitter: the midpoint rule is off by the warp squared.
-        const bool curved_sides = element == "hexahedron" || element == "wedge" || element == "pyramid";
+        const bool curved_sides =
+            element == "hexahedron" || element == "wedge" || element == "pyramid" || pattern == "solid";
         EXPECT_NEAR(inspect(mesh).volume, volume, curved_sides && irregular ? 1e-2 : 1e-12);
         EXPECT_EQ(mesh.vertices().colwise().minCoeff().norm(), 0);
         EXPECT_EQ(mesh.vertices().col(0).maxCoeff(), 2);

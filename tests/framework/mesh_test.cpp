@@ -72,7 +72,8 @@ TEST(Mesh, RefusesBadInputByName) {
   EXPECT_THAT(message_of([&] { Mesh(good.vertices(), {block}); }), HasSubstr("cell 1 (triangle) names vertex 7"));
   block.cells(1, 2) = 0;
   EXPECT_THAT(message_of([&] { Mesh(good.vertices(), {block}); }), HasSubstr("names vertex 0 twice"));
-  EXPECT_THAT(message_of([&] { Mesh(Points::Zero(3, 4), {block}); }), HasSubstr("need vertices with 2 coordinates"));
+  EXPECT_THAT(message_of([&] { Mesh(Points::Zero(5, 1), good.blocks()); }),
+              HasSubstr("triangle cells need vertices with 2 coordinates, found 1"));
 }
 
 TEST(Mesh, InspectFindsWhatIsWrong) {

@@ -16,7 +16,7 @@ block example >"$work/example.cpp"
 block output >"$work/expected.txt"
 
 cmake --install "$build" --prefix "$work/prefix" >/dev/null
-(cd "$work/prefix/include/halfgrad" && find . -name '*.hpp' -printf '#include "%P"\n' | sort) >"$work/headers.cpp"
+(cd "$work/prefix/include/halfgrad" && find . -name '*.hpp' -not -path './tests/*' -printf '#include "%P"\n' | sort) >"$work/headers.cpp"
 cmake -S "$consumer" -B "$work/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH="$work/prefix" \
   -DEXAMPLE_SOURCE="$work/example.cpp" -DHEADERS_SOURCE="$work/headers.cpp" >/dev/null
 cmake --build "$work/build"

@@ -287,6 +287,38 @@ TEST_F(MeshFileErrors, CountsBeyondTheFileFailFast) {
   EXPECT_THAT(message_of([&] { read_mesh(file("a.node", "8888888888 3 0 0\n1 0 0 0\n")); }), HasSubstr("8888888888"));
 }
 
+// One tetrahedron as DOLFINx writes it: a Lagrange cell of degree one in the only piece of a parallel file.
+TEST_F(MeshFileErrors, LagrangeCellsOfDegreeOneAndFilesOfOnePieceAreRead) {
+  const auto grid = [](int type, int num_nodes) {
+    return fmt::format(
+        "<VTKFile type='UnstructuredGrid' version='1.0'><UnstructuredGrid><Piece NumberOfPoints='4' NumberOfCells='1'>"
+        "<Points><DataArray type='Float64' NumberOfComponents='3' format='ascii'>0 0 0 1 0 0 0 1 0 0 0 1</DataArray>"
+        "</Points><Cells><DataArray type='Int32' Name='connectivity' format='ascii'>0 1 2 3</DataArray>"
+        "<DataArray type='Int32' Name='offsets' format='ascii'>{}</DataArray>"
+        "<DataArray type='UInt8' Name='types' format='ascii'>{}</DataArray></Cells></Piece></UnstructuredGrid>"
+        "</VTKFile>",
+        num_nodes, type);
+  };
+  const auto pieces = [](std::string_view list) {
+    return fmt::format("<VTKFile type='PUnstructuredGrid'><PUnstructuredGrid>{}</PUnstructuredGrid></VTKFile>", list);
+  };
+  file("a.vtu", grid(71, 4));
+  for (const fs::path& path : {file("a.vtu"), file("a.pvtu", pieces("<Piece Source='a.vtu'/>"))}) {
+    const Mesh mesh = read_mesh(path);
+    EXPECT_EQ(mesh.num_cells(), 1);
+    EXPECT_EQ(element_name(mesh, 0), "tetrahedron");
+    EXPECT_NEAR(inspect(mesh).volume, 1.0 / 6, 1e-15);
+  }
+
+  EXPECT_THAT(
+      message_of([&] { read_mesh(file("two.pvtu", pieces("<Piece Source='a.vtu'/><Piece Source='a.vtu'/>"))); }),
+      AllOf(HasSubstr("two.pvtu"), HasSubstr("2 pieces"), HasSubstr("merge")));
+  EXPECT_THAT(message_of([&] { read_mesh(file("self.pvtu", pieces("<Piece Source='self.pvtu'/>"))); }),
+              HasSubstr("expected a .vtu"));
+  file("loop.vtu", pieces("<Piece Source='loop.vtu'/>"));
+  EXPECT_THAT(message_of([&] { read_mesh(file("loop.vtu")); }), HasSubstr("PUnstructuredGrid"));
+}
+
 TEST_F(MeshFileErrors, UnregisteredTypesAreNamedWithTheirCount) {
   const std::string text =
       "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 float\n0 0 0 1 0 0 2 0 0\n"

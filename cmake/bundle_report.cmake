@@ -1,0 +1,22 @@
+# Run at build time: installs the packages of the lock file once (no package's own script runs) and bundles the script of
+# the report into `output`; where npm fails, the empty script takes its place.
+file(MAKE_DIRECTORY ${build})
+foreach(file package.json package-lock.json build.mjs)
+  file(COPY ${source}/${file} DESTINATION ${build})
+endforeach()
+file(SHA256 ${build}/package-lock.json wanted)
+set(installed "")
+if(EXISTS ${build}/installed.txt)
+  file(READ ${build}/installed.txt installed)
+endif()
+if(NOT installed STREQUAL wanted)
+  execute_process(COMMAND ${npm} ci --ignore-scripts --no-audit --no-fund --loglevel=error
+                  WORKING_DIRECTORY ${build} TIMEOUT 300 RESULT_VARIABLE failed OUTPUT_QUIET ERROR_VARIABLE complaint)
+  if(failed)
+    message("Report: static charts, because npm ci failed: ${complaint}")
+    file(COPY_FILE ${source}/no_script.cpp ${output})
+    return()
+  endif()
+  file(WRITE ${build}/installed.txt ${wanted})
+endif()
+execute_process(COMMAND ${node} ${build}/build.mjs ${source}/src ${output} COMMAND_ERROR_IS_FATAL ANY)
