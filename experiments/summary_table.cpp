@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "experiments/experiment.hpp"
 #include "framework/error.hpp"
@@ -28,6 +29,20 @@ std::string recommendation_text(const Recommendation& recommendation) {
   return text + " ...\n";
 }
 
+// How many times the cells linear interpolation would need for the error of a row of the last level: from the slope of
+// its error, and from how the cells of the levels grow as h falls. None where the levels do not tell.
+std::optional<double> cells_linear_needs(const ExperimentResult& result, const ResultRow& row) {
+  const std::optional<double>& gain = row.gain_over_linear[static_cast<std::size_t>(Region::all)];
+  const auto linear = std::find_if(result.orders.begin(), result.orders.end(), [](const ResultOrder& entry) {
+    return entry.interpolant == "linear" && entry.region == Region::all && entry.norm == Norm::rms;
+  });
+  const ResultRow& first = result.rows.front();
+  if (!gain || linear == result.orders.end() || !(linear->slope > 0) || first.cells >= row.cells || first.h <= row.h)
+    return std::nullopt;
+  const double growth = std::log(static_cast<double>(row.cells) / first.cells) / std::log(first.h / row.h);
+  return std::pow(*gain, growth / linear->slope);
+}
+
 }  // namespace
 
 std::string summary_table(const ExperimentResult& result) {
@@ -44,7 +59,11 @@ std::string summary_table(const ExperimentResult& result) {
     width = std::max(width, rule_name(row.interpolant, row.reconstructor, row.options).size());
   text += fmt::format("  {:<{}}  {:>10} {:>10}  {:>9} {:>9}", "rule", width, "rms inside", "boundary", "gain in.",
                       "gain bnd.");
-  text += result.orders.empty() ? "\n" : fmt::format("  {:>9} {:>9}\n", "order in.", "order bnd.");
+  if (!result.orders.empty()) text += fmt::format("  {:>9} {:>9}", "order in.", "order bnd.");
+  const bool has_cells = std::any_of(result.rows.begin(), result.rows.end(), [&](const ResultRow& row) {
+    return row.level == last.level && cells_linear_needs(result, row);
+  });
+  text += fmt::format("  {:>8}{}\n", "time", has_cells ? "  linear needs" : "");
   for (const ResultRow& row : result.rows) {
     if (row.level != last.level || row.frame != last.frame) continue;
     const auto rms = [&](Region region) {
@@ -63,6 +82,8 @@ std::string summary_table(const ExperimentResult& result) {
         text += order == result.orders.end() ? fmt::format(" {:>9}", "-") : fmt::format(" {:>9.2f}", order->slope);
       }
     }
+    text += fmt::format("  {:>8}", row.time_over_linear ? fmt::format("{:.3g}x", *row.time_over_linear) : "-");
+    if (const auto cells = cells_linear_needs(result, row); cells) text += fmt::format("  {:>6.3g}x cells", *cells);
     text += '\n';
   }
   if (result.recommendation) text += recommendation_text(*result.recommendation);
