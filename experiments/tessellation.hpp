@@ -5,8 +5,8 @@
 
 namespace halfgrad {
 
-/// Each cell of a plane mesh or of a surface, or each boundary facet of a body in space, cut into triangles, every edge in
-/// `subdivisions` parts. Facets share no points, so that each shows its own cell.
+/// Each cell of a plane mesh or of a surface, or each boundary facet of a body in space, cut into triangles, every edge
+/// in `subdivisions` parts. Facets share no points, so that each shows its own cell.
 PointCloud tessellation(const Mesh& mesh, int subdivisions);
 
 }  // namespace halfgrad
