@@ -1,15 +1,13 @@
 // The program on rest shapes that are no ordinary mesh: grids and surfaces in space.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <Eigen/Geometry>
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "apps/run_program.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
 #include "framework/io/mesh_file.hpp"
@@ -44,12 +42,9 @@ class RestShapes : public testing::Test {
     return values;
   }
   int run(const std::string& arguments) {
-    std::FILE* pipe = popen((std::string(HALFGRAD_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
-    output.clear();
-    std::array<char, 4096> buffer;
-    while (const std::size_t got = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.append(buffer.data(), got);
-    const int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    const Outcome outcome = run_program(arguments);
+    output = outcome.output;
+    return outcome.status;
   }
 
   std::filesystem::path directory;

@@ -15,7 +15,7 @@ mount -t proc proc "$chroot/proc"
 mount --bind /dev "$chroot/dev"
 trap 'umount "$chroot/proc" "$chroot/dev"' EXIT
 
-work=$chroot/tmp/halfgrad
+work=$chroot/halfgrad
 rm -rf "$work"
 mkdir -p "$work/consumer"
 cp "$packages"/*.deb "$work"
@@ -29,7 +29,7 @@ block output >"$work/consumer/expected.txt"
 
 chroot "$chroot" /bin/bash -euc '
 export DEBIAN_FRONTEND=noninteractive
-cd /tmp/halfgrad
+cd /halfgrad
 apt-get update -qq
 apt-get install -qq -y --no-install-recommends ./halfgrad_*.deb >/dev/null
 echo "== the program, without anything else"
