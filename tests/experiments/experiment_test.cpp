@@ -10,6 +10,7 @@
 
 #include "experiments/expectations.hpp"
 #include "framework/error.hpp"
+#include "support/message_of.hpp"
 
 namespace halfgrad {
 namespace {
@@ -77,16 +78,6 @@ TEST(Expectations, HoldOrFailByWhatWasMeasured) {
   EXPECT_NEAR(check(R"([{"interpolant": "phong", "level": 0, "gain_at_least": 1}])")[0].measured, 5, 1e-9);
   EXPECT_NEAR(check(R"([{"interpolant": "phong", "level": "all", "gain_at_least": 1}])")[0].measured, 5, 1e-9);
   EXPECT_TRUE(check(R"([{"options": {"patch": "lean"}, "norm": "max", "error_at_most": 0.0011}])")[0].holds);
-}
-
-template <class Function>
-std::string message_of(Function&& f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 TEST(Expectations, RefuseWhatMatchesNothingAndWhatBoundsNothing) {

@@ -11,6 +11,7 @@
 #include "experiments/results.hpp"
 #include "framework/error.hpp"
 #include "reconstruction/cell_averages.hpp"
+#include "support/message_of.hpp"
 
 namespace halfgrad {
 namespace {
@@ -125,16 +126,6 @@ TEST(ScatteredTransfer, IgnoresVerticesOfNoCell) {
   points << 0.5, 0.5, 0.5;
   const ScatteredTransfer transfer(with_loose, points, {});
   EXPECT_EQ(transfer.matrix().coeff(0, mesh.num_vertices()), 0);
-}
-
-template <class Function>
-std::string message_of(Function&& f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 TEST(ScatteredTransfer, RefusesWhatItCannotDo) {

@@ -7,6 +7,7 @@
 
 #include "framework/error.hpp"
 #include "framework/inverse_map.hpp"
+#include "support/message_of.hpp"
 #include "tests/support/test_meshes.hpp"
 
 namespace halfgrad {
@@ -30,16 +31,6 @@ double reproduction_error(const Mesh& mesh, const Points& points, const Embeddin
     });
   }
   return worst;
-}
-
-template <class Function>
-std::string message_of(Function&& f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 // Points around the unit cube and up to `reach` outside it.

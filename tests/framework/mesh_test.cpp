@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "framework/error.hpp"
+#include "support/message_of.hpp"
 
 namespace halfgrad {
 namespace {
@@ -19,16 +20,6 @@ Mesh square_of_triangles() {
   block.cells.resize(2, 3);
   block.cells << 0, 1, 2, 0, 2, 3;
   return Mesh(vertices, {block});
-}
-
-template <class Function>
-std::string message_of(Function&& f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 TEST(Mesh, CountsCellsThroughBlocks) {

@@ -14,6 +14,7 @@
 
 #include "framework/error.hpp"
 #include "framework/io/output_file.hpp"
+#include "support/message_of.hpp"
 
 namespace halfgrad {
 
@@ -55,16 +56,6 @@ inline std::string contents_of(const fs::path& path) {
 template <class T>
 std::string bytes(std::initializer_list<T> values) {
   return {reinterpret_cast<const char*>(values.begin()), values.size() * sizeof(T)};
-}
-
-template <class Function>
-std::string message_of(Function&& f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 }  // namespace halfgrad

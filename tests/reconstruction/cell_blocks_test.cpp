@@ -9,22 +9,13 @@
 #include "elements/simplex.hpp"
 #include "framework/interpolant.hpp"
 #include "reconstruction/registry.hpp"
+#include "support/message_of.hpp"
 #include "tests/support/test_meshes.hpp"
 
 namespace halfgrad {
 namespace {
 
 using testing::HasSubstr;
-
-template <class Function>
-std::string message_of(Function&& f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 // The mixed mesh of the registry's elements, as blocks of their own.
 CellBlocks<Hexahedron, Pyramid, Tetrahedron> own_blocks(const Mesh& mesh) {

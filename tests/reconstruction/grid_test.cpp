@@ -11,22 +11,13 @@
 #include "framework/interpolant.hpp"
 #include "reconstruction/centered_difference.hpp"
 #include "reconstruction/registry.hpp"
+#include "support/message_of.hpp"
 #include "tests/support/test_meshes.hpp"
 
 namespace halfgrad {
 namespace {
 
 using testing::HasSubstr;
-
-template <class Function>
-std::string message_of(Function&& f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 GridAxis regular(int cells, double origin, double spacing) { return {cells, origin, spacing, {}}; }
 GridAxis graded(std::vector<double> planes) { return {static_cast<int>(planes.size()) - 1, 0, 1, std::move(planes)}; }

@@ -11,22 +11,13 @@
 #include "framework/error.hpp"
 #include "reconstruction/registry.hpp"
 #include "reconstruction/surface_gradients.hpp"
+#include "support/message_of.hpp"
 
 namespace halfgrad {
 namespace {
 
 using testing::HasSubstr;
 using Vector3 = Eigen::Vector3d;
-
-template <class Function>
-std::string message_of(Function&& f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 // A smooth sheet over the unit square and its bent image, each with unit normals.
 Vector3 rest_sheet(double u, double v) { return {u, v, 0.2 * std::sin(2 * u + 0.3) * std::cos(1.7 * v)}; }
