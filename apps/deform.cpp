@@ -105,12 +105,13 @@ std::string run_name(const DeformOptions& options, const BindSettings& settings,
   return print.text();
 }
 
-// How many of the first `most` frames come from files older than the interrupted run.
+// How many of the first `most` frames come from files older than the interrupted run. Times of files advance in ticks, so
+// one of the same tick may be newer.
 Index num_unchanged(const FrameSource& source, const FrameRange& range, const std::filesystem::path& mark, Index most) {
   std::error_code absent;
   const auto begun = std::filesystem::last_write_time(mark, absent);
   for (Index i = 0; i < most; ++i)
-    if (std::filesystem::last_write_time(source.frame_name(range.frame(i)), absent) > begun || absent) return i;
+    if (std::filesystem::last_write_time(source.frame_name(range.frame(i)), absent) >= begun || absent) return i;
   return most;
 }
 
