@@ -100,9 +100,8 @@ kernels::PointStage<Scalar> point_stage(const Runs& runs, Eigen::Index columns, 
           .nodes = runs.nodes.data()->data(),
           .rest = runs.rest.data()->data()->data(),
           .first = runs.first.data(),
-          .first_chunk = runs.first_chunk.data(),
-          .chunks = runs.chunks.data(),
           .local = runs.local.data(),
+          .edges = runs.edges.view(),
           .extrapolates = runs.extrapolates.empty() ? nullptr : runs.extrapolates.data(),
           .affine = runs.affine.data(),
           .lines = lines,
@@ -230,7 +229,7 @@ void Interpolant<Scalar>::Binding::plain_point_stage(const Runs<E>& runs, Index 
       if (with_hessians) hessian[i] = hessians.data() + node * columns * sym;
     }
     for (Index p = runs.first[run]; p < runs.first[run + 1]; ++p) {
-      const NodeVector<E> weights_of_point = runs.beta(run, p);
+      const NodeVector<E> weights_of_point = runs.beta(p);
       std::array<Scalar, n> b;
       for (int i = 0; i < n; ++i) b[i] = static_cast<Scalar>(weights_of_point[i]);
       const auto coefficients = kernels::point_coefficients<Scalar, Scalar, n, d>(used, b, runs.rest[run]);
@@ -398,10 +397,16 @@ Index Interpolant<Scalar>::Binding::update(const Values<Scalar>& values, const E
       return std::any_of(runs.nodes[run].begin(), runs.nodes[run].end(),
                          [&](Index node) { return changed[node] != 0; });
     };
-    for_each_chosen_range(begin, end, is_stale, [&](Index first, Index last) {
+    // One range a window, from its first stale run to its last: the work that runs of a window share is done once.
+    for (; begin < end; begin += kernels::window_size) {
+      Index first = begin, last = std::min(begin + kernels::window_size, end), count = 0;
+      while (first < last && !is_stale(first)) ++first;
+      while (first < last && !is_stale(last - 1)) --last;
+      if (first == last) continue;
       stage.template run<E>(first, last);
-      num_evaluated += last - first;
-    });
+      for (Index run = first; run < last; ++run) count += is_stale(run);
+      num_evaluated += count;
+    }
   });
   return num_evaluated;
 }

@@ -140,22 +140,6 @@ bool has_affine_map(const NodeMatrix<E>& nodes, double magnitude) {
   return true;
 }
 
-// The chunks of each run.
-template <class Scalar, class Runs>
-void cut_into_chunks(Runs& runs) {
-  constexpr Index size = kernels::chunk_size<Scalar>;
-  const Index num_runs = runs.num_runs();
-  runs.first_chunk.resize(static_cast<std::size_t>(num_runs) + 1);
-  for (Index r = 0; r < num_runs; ++r)
-    runs.first_chunk[r + 1] = runs.first_chunk[r] + (runs.first[r + 1] - runs.first[r] + size - 1) / size;
-  runs.chunks.assign(static_cast<std::size_t>(runs.first_chunk.back()), static_cast<std::uint8_t>(size));
-  for (Index r = 0; r < num_runs; ++r) {
-    const Index last = runs.first_chunk[r + 1] - 1;
-    const Index count = runs.first[r + 1] - runs.first[r] - (last - runs.first_chunk[r]) * size;
-    runs.chunks[last] = static_cast<std::uint8_t>(count | kernels::last_chunk);
-  }
-}
-
 // Fills the runs of one element type from the cells `members` (places in order.cells); sizes are exact.
 template <class Runs, class Scalar>
 void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& order, std::span<const Index> members,
@@ -170,7 +154,6 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
   const auto num_points = static_cast<std::size_t>(runs.first.back());
   runs.local.assign(num_points * d + kernels::vector_padding, Scalar(0));
-  cut_into_chunks<Scalar>(runs);
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
   if (!outside_row.empty() && !E::affine) runs.offset.assign(num_points, -1);
@@ -196,7 +179,7 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
         for (int k = 0; k < d; ++k) {
           double xi = embedding.local(*points, k);
           if (E::affine && outside) xi += embedding.outside[outside_row[*points]].offset[k];
-          runs.local[runs.local_place(r, p, k)] = static_cast<Scalar>(xi);
+          runs.local[static_cast<Offset>(p) * d + k] = static_cast<Scalar>(xi);
         }
         if (outside) runs.extrapolates[r] = 1;
       }
@@ -269,9 +252,10 @@ void Interpolant<Scalar>::Binding::count_bytes() {
   for (const auto& any : blocks)
     std::visit(
         [&](const auto& runs) {
-          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.first_chunk) +
-                          bytes(runs.chunks) + bytes(runs.affine) + bytes(runs.local) + bytes(runs.offset) +
-                          bytes(runs.offsets) + bytes(runs.extrapolates);
+          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.affine) +
+                          bytes(runs.local) + bytes(runs.offset) + bytes(runs.offsets) + bytes(runs.extrapolates) +
+                          bytes(runs.edges.first) + bytes(runs.edges.ends) + bytes(runs.edges.vectors) +
+                          bytes(runs.edges.of_run);
         },
         any);
   report.bytes += bytes(weighted.first) + bytes(weighted.nodes) + bytes(weighted.coefficients) + bytes(weighted.beta);
@@ -337,6 +321,9 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
     runs.base = base;
     pack_runs<Runs, Scalar>(mesh, embedding, order, members, numbers.empty() ? number : part_number, outside_row, runs,
                             binding->permutation.data() + base);
+    if constexpr (E::affine)
+      if (rule.needs_gradients() && (rule.formula == Formula::blend || rule.formula == Formula::quadratic10))
+        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, runs.rest);
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));
   });

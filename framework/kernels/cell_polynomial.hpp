@@ -11,13 +11,20 @@
 //   stencils   [entry]             weights g_1 … g_d (q_11, q_12, …) of x_j − x_v; neighbors j
 //   nodes      [run][node]         number of the vertex; a run is the points of one cell
 //   rest       [run][node][axis]   X_i − X_0
-//   chunks     [chunk]             one byte for at most chunk_size points of a run: their number, and last_chunk where
-//                                  the run ends; the loop over chunks has no branch that depends on the data
-//   local      [chunk][axis][point]   ξ_1 … ξ_d of the chunk's points
+//   local      [point][axis]       ξ_1 … ξ_d
+//   edges      of simplices: each edge once a window of window_size runs
+//     first    [window]            its first edge
+//     ends     [edge][2]           numbers of the vertices i, j
+//     vectors  [edge][axis]        X_j − X_i
+//     of_run   [run][pair i < j]   number of the edge in its window, pairs of nodes as edge_number counts them
 //
-// Coefficients of a cell are a four each, in the order that monomials.hpp gives. They are written for a batch of cells
-// into a buffer of the first cache level before the first of them is read: a coefficient read right after its store
-// waits for the store.
+// A vector of results holds the columns of as many points as it has room for, in the order of memory (float, three
+// columns, sixteen lanes):   x y z x y z x y z x y z x y z .   It is stored whole, and the next overwrites what it
+// wrote too much. Coefficients are spread over lanes the same way once a cell; coordinates are spread once a vector of
+// points, by one permutation an axis from one load.
+//
+// Coefficients of cells that are not evaluated edge by edge stand in the order that monomials.hpp gives, a vector each,
+// for a batch of cells in a buffer of the first cache level.
 //
 // Sources: vertex_stage.inl, simplex.inl (degree 1 and 2), cubic.inl, product.inl (elements that are no simplices),
 // each compiled for float and double by a file of its own and, in it, once for every instruction set; fours.inl and
@@ -56,11 +63,22 @@ inline constexpr int max_fast_columns = 3;
 inline constexpr int max_simplex_dim = 3;
 /// Numbers by which arrays that are read a whole vector at a time are longer than their content.
 inline constexpr int vector_padding = 16;
-/// Greatest number of points of a chunk: a cache line of them.
+/// Number of runs that share the list of their edges.
+inline constexpr Index window_size = 128;
+
+/// Number of edges of a simplex.
+constexpr int num_edges(int dim) { return dim * (dim + 1) / 2; }
+/// Number of the edge between nodes i < j: 01 02 … 0d 12 ….
+constexpr int edge_number(int dim, int i, int j) { return i * (2 * dim + 1 - i) / 2 + j - i - 1; }
+
+/// The edges of simplices, a window of runs at a time.
 template <class Scalar>
-inline constexpr Index chunk_size = static_cast<Index>(64 / sizeof(Scalar));
-/// Marks the last chunk of a run.
-inline constexpr std::uint8_t last_chunk = 0x80;
+struct Edges {
+  const Index* first;
+  const Index* ends;
+  const Scalar* vectors;
+  const std::uint16_t* of_run;
+};
 
 /// Memory aligned to cache lines.
 struct alignas(64) CacheLine {
@@ -89,10 +107,9 @@ struct PointStage {
   Recipe recipe;
   const Index* nodes;
   const Scalar* rest;
-  const Index* first;        ///< [run] its first point
-  const Index* first_chunk;  ///< [run] its first chunk
-  const std::uint8_t* chunks;
+  const Index* first;  ///< [run] its first point
   const Scalar* local;
+  Edges<Scalar> edges;               ///< for recipe quadratic on simplices
   const std::uint8_t* extrapolates;  ///< [run] 1 where a point lies outside its cell; null where none does
   const std::uint8_t* affine;        ///< [run] 1 where x(ξ) is affine; null for simplices, where it always is
   const Scalar* lines;

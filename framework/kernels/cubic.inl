@@ -9,7 +9,7 @@ namespace halfgrad::kernels::HWY_NAMESPACE {
 // f = Σ β_i x_i + Σ_{i<j} β_i β_j (S_ij + (β_i − β_j) T_ij) with S_ij = (H_i − H_j)(X_j − X_i) and
 // T_ij = x_i − x_j + (H_i + H_j)(X_j − X_i), and β_0 = 1 − Σ β_k put in.
 template <int d, class T>
-HWY_INLINE void set_up_hermite(const T* const* line, const T* rest, T* coefficients) {
+HWY_INLINE void set_up_hermite(const Spread<T, d>& spread, const T* const* line, const T* rest, T* coefficients) {
   using F = Four<T>;
   using M = SimplexMonomials<3, d>;
   constexpr int size = M::size;
@@ -52,13 +52,13 @@ HWY_INLINE void set_up_hermite(const T* const* line, const T* rest, T* coefficie
     }
   }
   HALFGRAD_UNROLL
-  for (int i = 0; i < size; ++i) c[i].store(coefficients + 4 * i);
+  for (int i = 0; i < size; ++i) spread.columns_of(c[i]).store(coefficients + spread.size * i);
 }
 
 // f = b_0 + Σ_m β_m (b_m − b_0) with the vertices' Taylor polynomials b_i = x_i + H_i d_i + d_iᵀ Q_i d_i,
 // d_i = Σ_k β_k E_k − E_i, E_k = X_k − X_0.
 template <int d, class T>
-HWY_INLINE void set_up_dual_taylor(const T* const* line, const T* rest, T* coefficients) {
+HWY_INLINE void set_up_dual_taylor(const Spread<T, d>& spread, const T* const* line, const T* rest, T* coefficients) {
   using F = Four<T>;
   using M = SimplexMonomials<3, d>;
   constexpr int size = M::size, symmetric = num_symmetric(d);
@@ -120,19 +120,17 @@ HWY_INLINE void set_up_dual_taylor(const T* const* line, const T* rest, T* coeff
     }
   }
   HALFGRAD_UNROLL
-  for (int i = 0; i < size; ++i) c[i].store(coefficients + 4 * i);
+  for (int i = 0; i < size; ++i) spread.columns_of(c[i]).store(coefficients + spread.size * i);
 }
 
-// Three columns are computed always, and those stored that there are: the code of fewer is not worth its time to
-// compile.
 template <Recipe recipe, int d, class T>
 void evaluate_cubics(const PointStage<T>& stage, Index begin, Index end) {
   using Monomials = SimplexMonomials<3, d>;
-  constexpr int stride = 4 * Monomials::size;
   constexpr int line_length = 4 * (1 + num_weights(recipe, d));
-  const int columns = stage.num_columns;
+  const Spread<T, d> spread(stage.num_columns);
+  constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
-  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * columns;
+  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * stage.num_columns;
   for (Index batch = begin; batch < end; batch += batch_size) {
     const Index batch_end = std::min(batch + batch_size, end);
     T* target = coefficients;
@@ -141,11 +139,11 @@ void evaluate_cubics(const PointStage<T>& stage, Index begin, Index end) {
       find_lines<d + 1, line_length>(stage, run, line);
       const T* rest = stage.rest + static_cast<Offset>(run) * (d + 1) * d;
       if constexpr (recipe == Recipe::hermite)
-        set_up_hermite<d>(line, rest, target);
+        set_up_hermite<d>(spread, line, rest, target);
       else
-        set_up_dual_taylor<d>(line, rest, target);
+        set_up_dual_taylor<d>(spread, line, rest, target);
     }
-    evaluate_chunks<Monomials, max_fast_columns>(stage, batch, batch_end, coefficients, stride, columns, limit);
+    evaluate_polynomials<Monomials>(stage, spread, batch, batch_end, coefficients, stride, limit);
   }
 }
 

@@ -20,23 +20,24 @@ namespace halfgrad::kernels::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The columns of a vertex, in one vector where the target has vectors of four.
-template <class T>
-struct Four {
-  using Tag = hn::CappedTag<T, 4>;
+// `size` numbers in one vector, or in several where the target's vectors are shorter.
+template <class T, int size>
+struct Pack {
+  using Tag = hn::CappedTag<T, size>;
   using V = hn::Vec<Tag>;
   static constexpr int lanes = static_cast<int>(hn::MaxLanes(Tag()));
-  static constexpr int num_parts = 4 / lanes;
+  static constexpr int num_parts = size / lanes;
   V part[num_parts];
 
-  HWY_INLINE static Four zero() {
-    Four r;
+  HWY_INLINE static Pack zero() { return all(T(0)); }
+  HWY_INLINE static Pack all(T value) {
+    Pack r;
     HALFGRAD_UNROLL
-    for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Zero(Tag());
+    for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Set(Tag(), value);
     return r;
   }
-  HWY_INLINE static Four load(const T* from) {
-    Four r;
+  HWY_INLINE static Pack load(const T* from) {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Load(Tag(), from + p * lanes);
     return r;
@@ -45,39 +46,48 @@ struct Four {
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) hn::Store(part[p], Tag(), to + p * lanes);
   }
-  // this + other · factor
-  HWY_INLINE Four plus(const Four& other, T factor) const {
-    Four r;
+  HWY_INLINE void store_unaligned(T* to) const {
     HALFGRAD_UNROLL
-    for (int p = 0; p < num_parts; ++p) r.part[p] = hn::MulAdd(other.part[p], hn::Set(Tag(), factor), part[p]);
+    for (int p = 0; p < num_parts; ++p) hn::StoreU(part[p], Tag(), to + p * lanes);
+  }
+  // this + other · factor
+  HWY_INLINE Pack plus(const Pack& other, const Pack& factor) const {
+    Pack r;
+    HALFGRAD_UNROLL
+    for (int p = 0; p < num_parts; ++p) r.part[p] = hn::MulAdd(other.part[p], factor.part[p], part[p]);
     return r;
   }
+  HWY_INLINE Pack plus(const Pack& other, T factor) const { return plus(other, all(factor)); }
   // this − other · factor
-  HWY_INLINE Four minus(const Four& other, T factor) const {
-    Four r;
+  HWY_INLINE Pack minus(const Pack& other, T factor) const {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::NegMulAdd(other.part[p], hn::Set(Tag(), factor), part[p]);
     return r;
   }
-  HWY_INLINE Four operator+(const Four& other) const {
-    Four r;
+  HWY_INLINE Pack operator+(const Pack& other) const {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Add(part[p], other.part[p]);
     return r;
   }
-  HWY_INLINE Four operator-(const Four& other) const {
-    Four r;
+  HWY_INLINE Pack operator-(const Pack& other) const {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Sub(part[p], other.part[p]);
     return r;
   }
-  HWY_INLINE Four operator*(T factor) const {
-    Four r;
+  HWY_INLINE Pack operator*(T factor) const {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Mul(part[p], hn::Set(Tag(), factor));
     return r;
   }
 };
+
+// The columns of a vertex, padded.
+template <class T>
+using Four = Pack<T, 4>;
 
 // Σ_a column_a · factor_a.
 template <int d, class T>
