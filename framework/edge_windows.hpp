@@ -15,8 +15,11 @@ struct EdgeWindows {
   std::vector<std::array<Index, 2>> ends;
   std::vector<Scalar> vectors;
   std::vector<std::uint16_t> of_run;
+  std::vector<std::uint8_t> reversed;
 
-  kernels::Edges<Scalar> view() const { return {first.data(), ends.data()->data(), vectors.data(), of_run.data()}; }
+  kernels::Edges<Scalar> view() const {
+    return {first.data(), ends.data()->data(), vectors.data(), of_run.data(), reversed.data()};
+  }
 };
 
 /// `nodes` are the vertices of each run, `rest` their positions relative to the first.
@@ -34,10 +37,12 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Rest& rest) {
   const auto num_runs = static_cast<Index>(nodes.size());
   EdgeWindows<Scalar> result;
   result.of_run.reserve(nodes.size() * num_edges);
+  result.reversed.reserve(nodes.size());
   for (Index run = 0; run < num_runs; ++run) {
     const auto num_before = static_cast<Index>(result.ends.size());
     if (run % kernels::window_size == 0) result.first.push_back(num_before);
     const Index window_begin = result.first.back();
+    result.reversed.push_back(0);
     for (int i = 0; i < dim; ++i)
       for (int j = i + 1; j <= dim; ++j) {
         const auto [low, high] = std::minmax(nodes[run][i], nodes[run][j]);
@@ -52,6 +57,8 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Rest& rest) {
           for (int k = 0; k < dim; ++k) result.vectors.push_back(rest[run][j][k] - rest[run][i][k]);
         }
         result.of_run.push_back(static_cast<std::uint16_t>(slots[at].edge - window_begin));
+        if (result.ends[slots[at].edge][0] != nodes[run][i])
+          result.reversed.back() |= static_cast<std::uint8_t>(1 << kernels::edge_number(dim, i, j));
       }
   }
   result.first.push_back(static_cast<Index>(result.ends.size()));

@@ -202,17 +202,18 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
   std::vector<Index> row_of(number.size(), -1);
   for (Index r = 0; r < table.num_rows(); ++r) row_of[table.vertices[r]] = r;
   const int d = table.gdim, sym = with_hessians ? num_symmetric(d) : 0, width = d + sym;
-  stencils.offsets.resize(static_cast<std::size_t>(num_active) + 1);
+  stencils.width = width;
+  stencils.first_group.resize(static_cast<std::size_t>(num_active) + 1);
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
     if (r < 0) raise("no gradient stencil for vertex {}: reconstruct every active vertex", vertices[v]);
-    stencils.offsets[v + 1] = stencils.offsets[v] + table.offsets[r + 1] - table.offsets[r];
+    stencils.first_group[v + 1] = stencils.first_group[v] + (table.offsets[r + 1] - table.offsets[r] + 3) / 4;
   }
-  stencils.neighbors.resize(static_cast<std::size_t>(stencils.offsets.back()));
-  stencils.weights.resize(stencils.neighbors.size() * static_cast<std::size_t>(width) + kernels::vector_padding);
+  stencils.neighbors.resize(static_cast<std::size_t>(4 * stencils.first_group.back()));
+  stencils.weights.assign(stencils.neighbors.size() * static_cast<std::size_t>(width), Scalar(0));
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
-    Offset to = stencils.offsets[v];
+    Offset to = stencils.begin(v);
     for (Offset e = table.offsets[r]; e < table.offsets[r + 1]; ++e, ++to) {
       Index& neighbor = number[table.neighbors[e]];
       if (neighbor < 0) {
@@ -220,10 +221,12 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
         vertices.push_back(table.neighbors[e]);
       }
       stencils.neighbors[to] = neighbor;
-      for (int k = 0; k < d; ++k) stencils.weights[to * width + k] = static_cast<Scalar>(table.weights[e * d + k]);
+      for (int k = 0; k < d; ++k)
+        stencils.weights[stencils.place(to, k)] = static_cast<Scalar>(table.weights[e * d + k]);
       for (int k = 0; k < sym; ++k)
-        stencils.weights[to * width + d + k] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
+        stencils.weights[stencils.place(to, d + k)] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
     }
+    std::fill(stencils.neighbors.begin() + to, stencils.neighbors.begin() + stencils.end(v), v);
   }
   vertices.shrink_to_fit();
 }
@@ -243,7 +246,7 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
     blended = select_rows(*reconstruction, vertices);
   else
     pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
-  report.num_stencil_entries = blended ? table.num_entries() : static_cast<Offset>(stencils.neighbors.size());
+  report.num_stencil_entries = table.num_entries();
 }
 
 template <class Scalar>
@@ -255,11 +258,11 @@ void Interpolant<Scalar>::Binding::count_bytes() {
           report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.affine) +
                           bytes(runs.local) + bytes(runs.offset) + bytes(runs.offsets) + bytes(runs.extrapolates) +
                           bytes(runs.edges.first) + bytes(runs.edges.ends) + bytes(runs.edges.vectors) +
-                          bytes(runs.edges.of_run);
+                          bytes(runs.edges.of_run) + bytes(runs.edges.reversed);
         },
         any);
   report.bytes += bytes(weighted.first) + bytes(weighted.nodes) + bytes(weighted.coefficients) + bytes(weighted.beta);
-  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position) + bytes(stencils.offsets) +
+  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position) + bytes(stencils.first_group) +
                   bytes(stencils.neighbors) + bytes(stencils.weights);
   if (blended)
     for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging})
@@ -322,7 +325,7 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
     pack_runs<Runs, Scalar>(mesh, embedding, order, members, numbers.empty() ? number : part_number, outside_row, runs,
                             binding->permutation.data() + base);
     if constexpr (E::affine)
-      if (rule.needs_gradients() && (rule.formula == Formula::blend || rule.formula == Formula::quadratic10))
+      if (rule.needs_gradients() && !rule.needs_hessians())
         runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, runs.rest);
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));

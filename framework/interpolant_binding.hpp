@@ -23,7 +23,7 @@ struct Interpolant<Scalar>::Binding {
   //   rest         [run][node][axis]    rest position relative to the run's first node; one run more than there is
   //   first        [run]                position of the run's first point in the block
   //   local        [point][axis]        ξ; for simplices of a point outside too
-  //   edges        of simplices whose rule is a blend with gradients (kernels/cell_polynomial.hpp)
+  //   edges        of simplices whose rule takes gradients but no Hessians (kernels/cell_polynomial.hpp)
   //   affine       [run]                1 where x(ξ) is affine (polynomial elements but simplices)
   //   offset       [point]              row of `offsets` for points outside, else −1 (empty where no point is outside)
   //   extrapolates [run]                1 where a point is outside (empty where none is)
@@ -61,11 +61,18 @@ struct Interpolant<Scalar>::Binding {
   };
   using AnyRuns = Elements::apply<std::variant, Runs>;
 
-  // Rows of the active vertices in the numbering of `vertices`: weights of gradients, then of Hessians, an entry.
+  // Rows of the active vertices in the numbering of `vertices`, in groups of four entries
+  // (kernels/cell_polynomial.hpp). What fills a row up to whole groups is the vertex itself with weights of zero.
   struct Stencils {
-    std::vector<Offset> offsets{0};
+    int width = 0;  // weights of an entry: of the gradient, then of the Hessian
+    std::vector<Offset> first_group{0};
     std::vector<Index> neighbors;
     std::vector<Scalar> weights;
+
+    Offset begin(Offset row) const { return 4 * first_group[row]; }
+    Offset end(Offset row) const { return 4 * first_group[row + 1]; }
+    Offset place(Offset entry, int k) const { return 4 * (entry / 4 * width + k) + entry % 4; }
+    Scalar weight(Offset entry, int k) const { return weights[place(entry, k)]; }
   };
 
   // Points given by their weights: what a point reads of each vertex, a | c_1 … c_d | (q_11 …), and β apart.
@@ -99,8 +106,6 @@ struct Interpolant<Scalar>::Binding {
     if (!has_gradients)
       raise("this interpolant was bound without a reconstructor: give vertex gradients to evaluate_given");
   }
-
-  int num_stencil_weights() const { return gdim + (rule.needs_hessians() ? num_symmetric(gdim) : 0); }
 
   // Calls body(runs, begin, end) on ranges of runs that hold some thousand points each. Ranges begin with a window.
   template <class Body>

@@ -101,15 +101,14 @@ Values<Scalar> Interpolant<Scalar>::smooth_gradient(const Values<Scalar>& values
 template <class Scalar>
 void Interpolant<Scalar>::Binding::add_entries(Index point, Index node, double a, const double* c, const double* q,
                                                Entries& entries) const {
-  const int width = num_stencil_weights();
   double own = a;
   if (rule.needs_gradients())
-    for (Offset e = stencils.offsets[node]; e < stencils.offsets[node + 1]; ++e) {
+    for (Offset e = stencils.begin(node); e < stencils.end(node); ++e) {
       double weight = 0;
-      for (int k = 0; k < gdim; ++k) weight += c[k] * static_cast<double>(stencils.weights[e * width + k]);
+      for (int k = 0; k < gdim; ++k) weight += c[k] * static_cast<double>(stencils.weight(e, k));
       if (rule.needs_hessians())
         for (int k = 0; k < num_symmetric(gdim); ++k)
-          weight += q[k] * static_cast<double>(stencils.weights[e * width + gdim + k]);
+          weight += q[k] * static_cast<double>(stencils.weight(e, gdim + k));
       entries.emplace_back(point, vertices[stencils.neighbors[e]], weight);
       own -= weight;
     }

@@ -4,19 +4,20 @@
 //
 // Data, all in units of Scalar unless said; "four" is a vector of four that holds the 1 … 3 columns, padded with zeros:
 //
-//   positions  [vertex]            | x . . . |                          active vertices first, then those that stencils
-//   read lines      [active vertex]     | x . . . | H e_1 . | … | H e_d . | (Q_11 . | Q_12 . | …) |
-//              H = scale · F, Q likewise; one cache line for d = 3 in
-//              float without Q
-//   stencils   [entry]             weights g_1 … g_d (q_11, q_12, …) of x_j − x_v; neighbors j
-//   nodes      [run][node]         number of the vertex; a run is the points of one cell
-//   rest       [run][node][axis]   X_i − X_0
-//   local      [point][axis]       ξ_1 … ξ_d
+//   positions  [vertex]         | x . . . |        active vertices first, then those that only stencils read
+//   lines      [active vertex]  | x . . . | H e_1 . | … | H e_d . | (Q_11 . | Q_12 . | …) |
+//                               H = scale · F, Q likewise; a cache line for d = 3 in float without Q
+//   stencils   [row][group]     a vertex's entries in groups of four: neighbors j [4]; weights [g_1 … g_d (q_11 …)][4]
+//                               of x_j − x_v; the vertex itself with weights of zero fills the last group
+//   nodes      [run][node]      number of the vertex; a run is the points of one cell
+//   rest       [run][node][axis] X_i − X_0
+//   local      [point][axis]    ξ_1 … ξ_d
 //   edges      of simplices: each edge once a window of window_size runs
-//     first    [window]            its first edge
-//     ends     [edge][2]           numbers of the vertices i, j
-//     vectors  [edge][axis]        X_j − X_i
-//     of_run   [run][pair i < j]   number of the edge in its window, pairs of nodes as edge_number counts them
+//     first    [window]         its first edge
+//     ends     [edge][2]        numbers of the vertices i, j
+//     vectors  [edge][axis]     X_j − X_i
+//     of_run   [run][pair]      number of the edge in its window, for the pairs of nodes as edge_number counts them
+//     reversed [run]            a bit a pair, set where the edge runs from the second node to the first
 //
 // A vector of results holds the columns of as many points as it has room for, in the order of memory (float, three
 // columns, sixteen lanes):   x y z x y z x y z x y z x y z .   It is stored whole, and the next overwrites what it
@@ -26,9 +27,9 @@
 // Coefficients of cells that are not evaluated edge by edge stand in the order that monomials.hpp gives, a vector each,
 // for a batch of cells in a buffer of the first cache level.
 //
-// Sources: vertex_stage.inl, simplex.inl (degree 1 and 2), cubic.inl, product.inl (elements that are no simplices),
-// each compiled for float and double by a file of its own and, in it, once for every instruction set; fours.inl and
-// points.inl are what they share.
+// Sources: vertex_stage.inl, simplex.inl, cubic.inl (simplices with Hessians), product.inl (elements that are no
+// simplices), each compiled for float and double by a file of its own and, in it, once for every instruction set;
+// fours.inl and points.inl are what they share.
 #pragma once
 
 #include <array>
@@ -45,11 +46,6 @@ enum class Recipe : std::uint8_t {
   hermite,     ///< x, H = ½F
   dual_taylor  ///< x, H = ⅔F, ⅙Q
 };
-
-/// Degree of the polynomial on a simplex.
-constexpr int polynomial_degree(Recipe recipe) {
-  return recipe == Recipe::linear ? 1 : recipe == Recipe::quadratic ? 2 : 3;
-}
 
 /// Number of weights of a stencil entry.
 constexpr int num_weights(Recipe recipe, int dim) {
@@ -78,6 +74,7 @@ struct Edges {
   const Index* ends;
   const Scalar* vectors;
   const std::uint16_t* of_run;
+  const std::uint8_t* reversed;
 };
 
 /// Memory aligned to cache lines.
@@ -88,8 +85,8 @@ struct alignas(64) CacheLine {
 /// Lines of the active vertices from stencils.
 template <class Scalar>
 struct VertexStage {
-  int num_weights;  ///< of an entry; as many fours follow x in a line
-  const Offset* offsets;
+  int num_weights;            ///< of an entry; as many fours follow x in a line
+  const Offset* first_group;  ///< [row]
   const Index* neighbors;
   const Scalar* weights;
   std::array<Scalar, 9> scale;  ///< factor of each weight
@@ -109,7 +106,7 @@ struct PointStage {
   const Scalar* rest;
   const Index* first;  ///< [run] its first point
   const Scalar* local;
-  Edges<Scalar> edges;               ///< for recipe quadratic on simplices
+  Edges<Scalar> edges;               ///< of simplices under the recipes quadratic and hermite
   const std::uint8_t* extrapolates;  ///< [run] 1 where a point lies outside its cell; null where none does
   const std::uint8_t* affine;        ///< [run] 1 where x(ξ) is affine; null for simplices, where it always is
   const Scalar* lines;
@@ -122,7 +119,7 @@ struct PointStage {
   void run(Index begin, Index end) const {
     if constexpr (!E::affine)
       run_product(E::vtk_id, begin, end);
-    else if (polynomial_degree(recipe) == 3)
+    else if (recipe == Recipe::dual_taylor)
       run_cubic(E::dim, begin, end);
     else
       run_simplex(E::dim, begin, end);

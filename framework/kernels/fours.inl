@@ -98,48 +98,6 @@ HWY_INLINE Four<T> product(const Four<T>* column, const T* factor) {
   return sum;
 }
 
-// Whether one vector holds four fours: a block of lanes each, numbered from 0.
-template <class T>
-inline constexpr bool has_four_blocks = hn::MaxLanes(hn::ScalableTag<T>()) >= 16;
-
-// Operations on vectors of four blocks; used where has_four_blocks.
-template <class T>
-struct Blocks {
-  using Tag = hn::CappedTag<T, 16>;
-  using V = hn::Vec<Tag>;
-
-  // The four at `from` in every block.
-  HWY_INLINE static V duplicate(const T* from) { return hn::LoadDup128(Tag(), from); }
-  // Lane k of every block b is v[place[b]].
-  template <int place0, int place1, int place2, int place3>
-  HWY_INLINE static V spread(V v) {
-    alignas(64) static constexpr std::int32_t lane[16] = {place0, place0, place0, place0, place1, place1,
-                                                          place1, place1, place2, place2, place2, place2,
-                                                          place3, place3, place3, place3};
-    return hn::TableLookupLanes(v, hn::SetTableIndices(Tag(), lane));
-  }
-  // Block b is block from[b] of v.
-  template <int from0, int from1, int from2, int from3>
-  HWY_INLINE static V permute(V v) {
-    alignas(64) static constexpr std::int32_t lane[16] = {
-        4 * from0, 4 * from0 + 1, 4 * from0 + 2, 4 * from0 + 3, 4 * from1, 4 * from1 + 1, 4 * from1 + 2, 4 * from1 + 3,
-        4 * from2, 4 * from2 + 1, 4 * from2 + 2, 4 * from2 + 3, 4 * from3, 4 * from3 + 1, 4 * from3 + 2, 4 * from3 + 3};
-    return hn::TableLookupLanes(v, hn::SetTableIndices(Tag(), lane));
-  }
-  // Lanes of the blocks whose bits are set.
-  template <int blocks>
-  HWY_INLINE static hn::Mask<Tag> mask() {
-    constexpr auto bit = [](int b) { return (blocks >> b & 1) != 0 ? 15 : 0; };
-    alignas(8) static constexpr std::uint8_t bits[8] = {bit(0) | bit(1) << 4, bit(2) | bit(3) << 4};
-    return hn::LoadMaskBits(Tag(), bits);
-  }
-  // Blocks whose bits are set from `yes`, the others from `no`.
-  template <int blocks>
-  HWY_INLINE static V select(V yes, V no) {
-    return hn::IfThenElse(mask<blocks>(), yes, no);
-  }
-};
-
 }  // namespace halfgrad::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif

@@ -31,11 +31,12 @@ class Spread {
   // One point a vector where vectors are short: then coordinates are broadcast and coefficients stay as they are.
   static constexpr bool single = size == 4;
 
-  explicit Spread(int columns) : num_points(single ? 1 : size / std::max(d, columns)) {
+  HWY_INLINE explicit Spread(int columns) : num_points(single ? 1 : size / std::max(d, columns)) {
     if constexpr (!single) {
       HWY_ALIGN TI lane[size];
       for (int l = 0; l < size; ++l) lane[l] = static_cast<TI>(l % columns);
       column_ = hn::SetTableIndices(Tag(), lane);
+      HALFGRAD_UNROLL
       for (int k = 0; k < d; ++k) {
         for (int l = 0; l < size; ++l) lane[l] = static_cast<TI>(std::min(l / columns, num_points - 1) * d + k);
         coordinate_[k] = hn::SetTableIndices(Tag(), lane);
@@ -71,16 +72,16 @@ class Spread {
     }
   }
 
-  // Stores the results of at most num_points points before `limit`. Vectors are stored whole: what a store writes too
-  // much, the next overwrites; before `limit`, where the caller's range ends, only the points are copied.
-  HWY_INLINE void store(const W& results, Index count, int columns, T* out, const T* limit) const {
-    if (HWY_LIKELY(limit - out >= size)) {
-      results.store_unaligned(out);
-    } else {
-      HWY_ALIGN T rows[size];
-      results.store(rows);
-      std::copy_n(rows, std::min<Index>(count, num_points) * columns, out);
-    }
+  // The number of points, counted from the first of stage.out, before which every vector of results that begins there
+  // may be stored whole: what a store writes too much, the next overwrites.
+  Index num_whole(const PointStage<T>& stage, Index end) const {
+    return stage.first[end] - (size + stage.num_columns - 1) / stage.num_columns;
+  }
+  // Before the end of the caller's range only the points are copied.
+  HWY_INLINE void store_bounded(const W& results, Index count, int columns, T* out) const {
+    HWY_ALIGN T rows[size];
+    results.store(rows);
+    std::copy_n(rows, std::min<Index>(count, num_points) * columns, out);
   }
 
   const int num_points;  // of a vector
@@ -139,22 +140,35 @@ HWY_INLINE W horner_from(const T* c, const W* xi) {
     return lowest;
 }
 
+// Calls value(xi) for each vector of a run's points and stores what it returns.
+template <int d, class T, class Value>
+HWY_INLINE void evaluate_points(const PointStage<T>& stage, const Spread<T, d>& spread, Index run, Index num_whole,
+                                Value&& value) {
+  const int columns = stage.num_columns, step = spread.num_points;
+  const T* local = stage.local + static_cast<Offset>(stage.first[run]) * d;
+  T* out = stage.out + static_cast<Offset>(stage.first[run]) * columns;
+  Index left = stage.first[run + 1] - stage.first[run];
+  // Two loops: a test for the end of the range in the first costs a tenth of a frame.
+  Index bounded = std::clamp(stage.first[run + 1] - num_whole, 0, left);
+  for (; left > bounded; left -= step, local += step * d, out += step * columns) {
+    Wide<T> xi[d];
+    spread.coordinates(local, xi);
+    value(xi).store_unaligned(out);
+  }
+  for (; HWY_UNLIKELY(left > 0); left -= step, local += step * d, out += step * columns) {
+    Wide<T> xi[d];
+    spread.coordinates(local, xi);
+    spread.store_bounded(value(xi), left, columns, out);
+  }
+}
+
 // The points of runs whose coefficients, spread over lanes, stand `stride` apart.
 template <class Monomials, class T>
 HWY_INLINE void evaluate_polynomials(const PointStage<T>& stage, const Spread<T, Monomials::dim>& spread, Index begin,
-                                     Index end, const T* coefficients, int stride, const T* limit) {
-  constexpr int d = Monomials::dim;
-  const int columns = stage.num_columns;
-  for (Index run = begin; run < end; ++run, coefficients += stride) {
-    const T* const local = stage.local + static_cast<Offset>(stage.first[run]) * d;
-    T* const out = stage.out + static_cast<Offset>(stage.first[run]) * columns;
-    const Index count = stage.first[run + 1] - stage.first[run];
-    for (Index p = 0; p < count; p += spread.num_points) {
-      Wide<T> xi[d];
-      spread.coordinates(local + p * d, xi);
-      spread.store(horner<Monomials, 0>(coefficients, xi), count - p, columns, out + p * columns, limit);
-    }
-  }
+                                     Index end, const T* coefficients, int stride, Index num_whole) {
+  for (Index run = begin; run < end; ++run, coefficients += stride)
+    evaluate_points<Monomials::dim>(stage, spread, run, num_whole,
+                                    [&](const Wide<T>* xi) HWY_ATTR { return horner<Monomials, 0>(coefficients, xi); });
 }
 
 // ---- runs
@@ -174,8 +188,10 @@ HWY_INLINE void find_lines(const PointStage<T>& stage, Index run, const T** line
 // (1 − 1/n)/2 · |(H_i − H_j)(X_j − X_i)| for the pair of nodes where that is greatest (Binding::correction_bound). A
 // NaN is not bounded, nor is a cell with points outside.
 template <int num_nodes, int d, class T>
-HWY_NOINLINE bool is_within_tolerance(const PointStage<T>& stage, Index run, const T* const* line) {
+HWY_NOINLINE bool is_within_tolerance(const PointStage<T>& stage, Index run) {
   if (stage.extrapolates != nullptr && stage.extrapolates[run] != 0) return false;
+  const T* line[num_nodes];
+  find_lines<num_nodes, 4 * (1 + d)>(stage, run, line);
   const T* rest = stage.rest + static_cast<Offset>(run) * num_nodes * d;
   const T longest = stage.tolerance * 2 * num_nodes / (num_nodes - 1);
   for (int i = 0; i < num_nodes; ++i)

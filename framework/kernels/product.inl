@@ -101,7 +101,7 @@ void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
   const Spread<T, E::dim> spread(stage.num_columns);
   constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
-  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * stage.num_columns;
+  const Index num_whole = spread.num_whole(stage, end);
   for (Index batch = begin; batch < end; batch += batch_size) {
     const Index batch_end = std::min(batch + batch_size, end);
     T* target = coefficients;
@@ -110,12 +110,12 @@ void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
       find_lines<E::num_nodes, 4>(stage, run, line);
       set_up_shape<E, Factor::none>(spread, line, target);
     }
-    evaluate_polynomials<Monomials>(stage, spread, batch, batch_end, coefficients, stride, limit);
+    evaluate_polynomials<Monomials>(stage, spread, batch, batch_end, coefficients, stride, num_whole);
   }
 }
 
 template <class E, Factor factor, class T>
-HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, Index begin, Index end, const T* limit) {
+HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, Index begin, Index end, Index num_whole) {
   using Monomials = ProductMonomials<E, factor>;
   const Spread<T, E::dim> spread(stage.num_columns);
   constexpr int stride = spread.size * Monomials::size;
@@ -124,26 +124,26 @@ HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, Index begin, 
   for (Index run = begin; run < end; ++run, target += stride) {
     const T* line[E::num_nodes];
     find_lines<E::num_nodes, 4 * (1 + E::dim)>(stage, run, line);
-    if (HWY_UNLIKELY(stage.tolerance > 0) && is_within_tolerance<E::num_nodes, E::dim>(stage, run, line)) {
+    if (HWY_UNLIKELY(stage.tolerance > 0) && is_within_tolerance<E::num_nodes, E::dim>(stage, run)) {
       std::fill(target, target + stride, T(0));
       set_up_shape<E, factor>(spread, line, target);
     } else {
       set_up_blend<E, factor>(spread, line, stage.rest + static_cast<Offset>(run) * E::num_nodes * E::dim, target);
     }
   }
-  evaluate_polynomials<Monomials>(stage, spread, begin, end, coefficients, stride, limit);
+  evaluate_polynomials<Monomials>(stage, spread, begin, end, coefficients, stride, num_whole);
 }
 
 template <class E, class T>
 void evaluate_blend(const PointStage<T>& stage, Index begin, Index end) {
-  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * stage.num_columns;
+  const Index num_whole = Spread<T, E::dim>(stage.num_columns).num_whole(stage, end);
   for (Index batch = begin; batch < end; batch += batch_size) {
     const Index batch_end = std::min(batch + batch_size, end);
     const bool affine = std::all_of(stage.affine + batch, stage.affine + batch_end, [](auto a) { return a != 0; });
     if (affine)
-      evaluate_blend_batch<E, Factor::affine>(stage, batch, batch_end, limit);
+      evaluate_blend_batch<E, Factor::affine>(stage, batch, batch_end, num_whole);
     else
-      evaluate_blend_batch<E, Factor::shape>(stage, batch, batch_end, limit);
+      evaluate_blend_batch<E, Factor::shape>(stage, batch, batch_end, num_whole);
   }
 }
 

@@ -1,4 +1,4 @@
-// Simplices under the rules of degree one and two. A source file defines HALFGRAD_SCALAR and HWY_TARGET_INCLUDE, then
+// Simplices under the rules that take no Hessians. A source file defines HALFGRAD_SCALAR and HWY_TARGET_INCLUDE, then
 // includes this one; Highway includes that source once a target.
 #include <hwy/foreach_target.h>
 #include "framework/kernels/points.inl"
@@ -6,88 +6,127 @@
 HWY_BEFORE_NAMESPACE();
 namespace halfgrad::kernels::HWY_NAMESPACE {
 
-// With β_0 = 1 − Σ β_k and the bulge S_ij = (H_i − H_j)(X_j − X_i) of an edge,
+// With β_0 = 1 − Σ β_k and the bulge S_ij = (H_i − H_j)(X_j − X_i) of an edge, a blend is
 //   f = Σ_i β_i (x_i + H_i (X − X_i)) = Σ_i β_i x_i + Σ_{i<j} β_i β_j S_ij
 //     = x_0 + Σ_k β_k (x_k − x_0 + β_0 S_0k + Σ_{l>k} β_l S_kl).
-// A bulge is computed once for all cells of a window that share the edge, and it does not depend on the direction in
-// which they run along it.
+// Hermite has S_ij + (β_i − β_j) T_ij in place of S_ij, T_ij = x_i − x_j + (H_i + H_j)(X_j − X_i).
+// Both are computed once for all cells of a window that share the edge. S does not depend on the direction in which a
+// cell runs along it, T changes its sign.
 
-// The bulges of a window, spread over lanes.
-template <int d, class T>
-HWY_INLINE void set_up_bulges(const PointStage<T>& stage, const Spread<T, d>& spread, Index window, T* bulges) {
+// Vectors of an edge.
+template <Recipe recipe>
+constexpr int num_edge_vectors = recipe == Recipe::linear    ? 0
+                                 : recipe == Recipe::hermite ? 2
+                                                             : 1;
+
+// S, or S and T, of a window, spread over lanes.
+template <Recipe recipe, int d, class T>
+HWY_INLINE void set_up_edges(const PointStage<T>& stage, const Spread<T, d>& spread, Index window, T* vectors) {
   using F = Four<T>;
   constexpr int line_length = 4 * (1 + d);
-  for (Index e = stage.edges.first[window]; e < stage.edges.first[window + 1]; ++e, bulges += spread.size) {
-    const Offset edge = e;
-    const T* const a = stage.lines + line_length * static_cast<Offset>(stage.edges.ends[2 * edge]) + 4;
-    const T* const b = stage.lines + line_length * static_cast<Offset>(stage.edges.ends[2 * edge + 1]) + 4;
-    const T* const along = stage.edges.vectors + d * edge;
-    F bulge = (F::load(a) - F::load(b)) * along[0];
+  for (Offset e = stage.edges.first[window]; e < stage.edges.first[window + 1]; ++e) {
+    const T* const a = stage.lines + line_length * static_cast<Offset>(stage.edges.ends[2 * e]);
+    const T* const b = stage.lines + line_length * static_cast<Offset>(stage.edges.ends[2 * e + 1]);
+    const T* const along = stage.edges.vectors + d * e;
+    F s = (F::load(a + 4) - F::load(b + 4)) * along[0];
     HALFGRAD_UNROLL
-    for (int k = 1; k < d; ++k) bulge = bulge.plus(F::load(a + 4 * k) - F::load(b + 4 * k), along[k]);
-    spread.columns_of(bulge).store(bulges);
+    for (int k = 1; k < d; ++k) s = s.plus(F::load(a + 4 * (1 + k)) - F::load(b + 4 * (1 + k)), along[k]);
+    spread.columns_of(s).store(vectors);
+    vectors += spread.size;
+    if constexpr (recipe == Recipe::hermite) {
+      F t = F::load(a) - F::load(b);
+      HALFGRAD_UNROLL
+      for (int k = 0; k < d; ++k) t = t.plus(F::load(a + 4 * (1 + k)) + F::load(b + 4 * (1 + k)), along[k]);
+      spread.columns_of(t).store(vectors);
+      vectors += spread.size;
+    }
   }
 }
 
-// The points of a run; without bulges, linear interpolation.
-template <int degree, int d, class T>
-HWY_INLINE void evaluate_run(const PointStage<T>& stage, const Spread<T, d>& spread, Index run, const T* const* line,
-                             const T* bulges, const T* limit) {
+// The points of a run under a recipe whose lines are `line_length` long; recipe linear reads no edges.
+template <Recipe recipe, int line_length, int d, class T>
+HWY_INLINE void evaluate_run(const PointStage<T>& stage, const Spread<T, d>& spread, Index run, const T* vectors,
+                             Index num_whole) {
   using W = Wide<T>;
-  const int columns = stage.num_columns;
-  W x[d + 1], bulge[num_edges(d)];
+  constexpr int edges = num_edges(d), stride = num_edge_vectors<recipe> * spread.size;
+  const Index* const node = stage.nodes + static_cast<Offset>(run) * (d + 1);
+  W x[d + 1], s[edges], t[edges];
   HALFGRAD_UNROLL
-  for (int i = 0; i <= d; ++i) x[i] = spread.columns_of(Four<T>::load(line[i]));
+  for (int i = 0; i <= d; ++i)
+    x[i] = spread.columns_of(Four<T>::load(stage.lines + static_cast<Offset>(node[i]) * line_length));
   HALFGRAD_UNROLL
   for (int k = 1; k <= d; ++k) x[k] = x[k] - x[0];
-  if constexpr (degree == 2) {
-    const std::uint16_t* const edge = stage.edges.of_run + static_cast<Offset>(run) * num_edges(d);
+  if constexpr (recipe != Recipe::linear) {
+    const std::uint16_t* const edge = stage.edges.of_run + static_cast<Offset>(run) * edges;
     HALFGRAD_UNROLL
-    for (int e = 0; e < num_edges(d); ++e) bulge[e] = W::load(bulges + spread.size * edge[e]);
+    for (int e = 0; e < edges; ++e) {
+      const T* const from = vectors + stride * edge[e];
+      s[e] = W::load(from);
+      if constexpr (recipe == Recipe::hermite)
+        t[e] = W::load(from + spread.size) * ((stage.edges.reversed[run] >> e & 1) != 0 ? T(-1) : T(1));
+    }
   }
-  const T* local = stage.local + static_cast<Offset>(stage.first[run]) * d;
-  T* out = stage.out + static_cast<Offset>(stage.first[run]) * columns;
-  for (Index left = stage.first[run + 1] - stage.first[run]; left > 0; left -= spread.num_points) {
-    W xi[d], rest = W::all(T(1)), value = x[0];
-    spread.coordinates(local, xi);
+  evaluate_points<d>(stage, spread, run, num_whole, [&](const W* xi) HWY_ATTR {
+    W value = x[0], beta[d + 1];
+    beta[0] = W::all(T(1)) - xi[0];
     HALFGRAD_UNROLL
-    for (int k = 0; k < d; ++k) rest = rest - xi[k];
+    for (int k = 1; k <= d; ++k) beta[k] = xi[k - 1];
+    if constexpr (d > 1) {
+      W others = xi[1];
+      HALFGRAD_UNROLL
+      for (int k = 2; k < d; ++k) others = others + xi[k];
+      beta[0] = beta[0] - others;
+    }
     HALFGRAD_UNROLL
     for (int k = d; k >= 1; --k) {
       W slope = x[k];
-      if constexpr (degree == 2) {
+      if constexpr (recipe != Recipe::linear) {
         HALFGRAD_UNROLL
-        for (int l = k + 1; l <= d; ++l) slope = slope.plus(xi[l - 1], bulge[edge_number(d, k, l)]);
-        slope = slope.plus(rest, bulge[edge_number(d, 0, k)]);
+        for (int step = 0; step < d - k + 1; ++step) {
+          const int other = step < d - k ? d - step : 0;  // β_0 comes last: it is there last
+          const int e = edge_number(d, std::min(k, other), std::max(k, other));
+          W bulge = s[e];
+          if constexpr (recipe == Recipe::hermite)
+            bulge = bulge.plus(t[e], other == 0 ? beta[0] - beta[k] : beta[k] - beta[other]);
+          slope = slope.plus(beta[other], bulge);
+        }
       }
-      value = value.plus(xi[k - 1], slope);
+      value = value.plus(beta[k], slope);
     }
-    spread.store(value, left, columns, out, limit);
-    local += spread.num_points * d;
-    out += spread.num_points * columns;
+    return value;
+  });
+}
+
+// is_within_tolerance from the edges' vectors S.
+template <int d, class T>
+HWY_NOINLINE bool is_within_tolerance_of_edges(const PointStage<T>& stage, Index run, const T* vectors) {
+  if (stage.extrapolates != nullptr && stage.extrapolates[run] != 0) return false;
+  const T longest = stage.tolerance * 2 * (d + 1) / d;
+  for (int e = 0; e < num_edges(d); ++e) {
+    const T* const s = vectors + Spread<T, d>::size * stage.edges.of_run[static_cast<Offset>(run) * num_edges(d) + e];
+    T squared = 0;
+    for (int c = 0; c < stage.num_columns; ++c) squared += s[c] * s[c];
+    if (!(squared <= longest * longest)) return false;
   }
+  return true;
 }
 
 template <Recipe recipe, int d, class T>
-void evaluate_runs(const PointStage<T>& stage, Index begin, Index end) {
+void evaluate_runs(const PointStage<T>& given, Index begin, Index end) {
+  const PointStage<T> stage = given;  // a copy, so that stores to the results do not make its members be read again
   constexpr int line_length = 4 * (1 + num_weights(recipe, d));
   const Spread<T, d> spread(stage.num_columns);
-  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * stage.num_columns;
-  constexpr int max_bulges = recipe == Recipe::linear ? 0 : window_size * num_edges(d);
-  HWY_ALIGN T bulges[max_bulges * spread.size + 1];
+  const Index num_whole = spread.num_whole(stage, end);
+  const bool with_tolerance = recipe == Recipe::quadratic && stage.tolerance > 0;
+  HWY_ALIGN T vectors[window_size * num_edges(d) * num_edge_vectors<recipe> * spread.size + 1];
   for (Index run = begin; run < end;) {
     const Index window = run / window_size, window_end = std::min(end, (window + 1) * window_size);
-    if constexpr (recipe == Recipe::quadratic) set_up_bulges<d>(stage, spread, window, bulges);
+    if constexpr (recipe != Recipe::linear) set_up_edges<recipe, d>(stage, spread, window, vectors);
     for (; run < window_end; ++run) {
-      const T* line[d + 1];
-      find_lines<d + 1, line_length>(stage, run, line);
-      if constexpr (recipe == Recipe::quadratic) {
-        if (HWY_LIKELY(!(stage.tolerance > 0)) || !is_within_tolerance<d + 1, d>(stage, run, line)) {
-          evaluate_run<2>(stage, spread, run, line, bulges, limit);
-          continue;
-        }
-      }
-      evaluate_run<1>(stage, spread, run, line, bulges, limit);
+      if (HWY_UNLIKELY(with_tolerance) && is_within_tolerance_of_edges<d>(given, run, vectors))
+        evaluate_run<Recipe::linear, line_length>(stage, spread, run, vectors, num_whole);
+      else
+        evaluate_run<recipe, line_length>(stage, spread, run, vectors, num_whole);
     }
   }
 }
@@ -105,10 +144,14 @@ void with_dimension(const PointStage<T>& stage, int dim, Index begin, Index end)
 }
 
 void simplex_points(const PointStage<HALFGRAD_SCALAR>& stage, int dim, Index begin, Index end) {
-  if (stage.recipe == Recipe::linear)
-    with_dimension<Recipe::linear>(stage, dim, begin, end);
-  else
-    with_dimension<Recipe::quadratic>(stage, dim, begin, end);
+  switch (stage.recipe) {
+    case Recipe::linear:
+      return with_dimension<Recipe::linear>(stage, dim, begin, end);
+    case Recipe::hermite:
+      return with_dimension<Recipe::hermite>(stage, dim, begin, end);
+    default:
+      return with_dimension<Recipe::quadratic>(stage, dim, begin, end);
+  }
 }
 
 }  // namespace halfgrad::kernels::HWY_NAMESPACE
