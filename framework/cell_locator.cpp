@@ -384,7 +384,8 @@ CellLocations locate_in(const Mesh& mesh, const Points& points, double tolerance
       });
     }
   });
-  for (auto& axis : grid.x) axis = {};
+  for (auto& axis : grid.x) std::vector<double>().swap(axis);
+  std::vector<double>().swap(grid.margin);
   CellLocations result{std::vector<Index>(count, -1), Points(count, D)};
   parallel_for(count, 65536, [&](std::int64_t begin, std::int64_t end) {
     for (auto p = static_cast<Index>(begin); p < end; ++p) {

@@ -88,7 +88,9 @@ void CellStar::add(Index vertex, Index cell) {
   cells.push_back(cell);
   members_.push_back(place);
   volumes.push_back(gradient.volume);
-  offsets.emplace_back(gradient.centroid - geometry_->vertices().row(vertex).transpose());
+  const Points& vertices = geometry_->vertices();
+  Vector& offset = offsets.emplace_back(vertices.cols());
+  for (Eigen::Index a = 0; a < vertices.cols(); ++a) offset[a] = gradient.centroid[a] - vertices(vertex, a);
 }
 
 std::span<const CellGradient* const> CellStar::gradients() {

@@ -31,7 +31,7 @@ class CellStar {
   std::span<const CellGradient* const> gradients();
 
  private:
-  static constexpr std::size_t max_known = 2048;  // some 0.7 MB
+  static constexpr std::size_t max_known = 4096;  // some 1.3 MB
 
   const CellGradients* geometry_;
   std::vector<CellGradient> known_;

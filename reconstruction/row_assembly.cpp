@@ -74,10 +74,11 @@ void append(const GradientStencilTable& chunk, GradientStencilTable& table) {
   join(table.diagnostics, chunk.diagnostics);
 }
 
-// Room for all rows if they are as long as the first ones, and a tenth more.
+// Room for all rows if they are at most twice as long as the first ones, which may lie on a boundary. Room that is not
+// used is never touched.
 void reserve_for(std::int64_t num_rows, std::int64_t num_made, GradientStencilTable& table) {
   if (num_made >= num_rows) return;
-  const double growth = 1.1 * static_cast<double>(num_rows) / static_cast<double>(num_made);
+  const double growth = 2 * static_cast<double>(num_rows) / static_cast<double>(num_made);
   for (auto* weights : {&table.weights, &table.hessian_weights})
     weights->reserve(static_cast<std::size_t>(growth * static_cast<double>(weights->size())));
   table.neighbors.reserve(static_cast<std::size_t>(growth * static_cast<double>(table.neighbors.size())));
