@@ -9,7 +9,6 @@
 #include <memory>
 
 #include "apps/deform.hpp"
-#include "apps/deform_scattered.hpp"
 #include "apps/describe.hpp"
 #include "apps/export.hpp"
 #include "apps/listings.hpp"
@@ -193,6 +192,9 @@ int dispatch(int argc, char** argv) {
                    "Also carry the surface's normals: gradient (of the map, default) or smooth (across cells)")
       ->expected(0, 1)
       ->default_str("gradient");
+  deform_app->add_flag("--tangents", options.tangents,
+                       "Also carry tangents with handedness, of the surface or from its texture coordinates, by the "
+                       "gradients of --normals");
   deform_app->add_flag("--gradients", options.gradients, "Also write deformation gradients at the points");
   deform_app->add_flag("--stretch", options.stretch, "Also write principal stretches at the points");
   deform_app
@@ -283,10 +285,7 @@ int dispatch(int argc, char** argv) {
   if (deform_app->parsed()) {
     options.progress = mode;
     options.quiet = quiet;
-    if (is_scattered(options.bind.interpolant.value_or("phong")))
-      deform_scattered(options);
-    else
-      deform(options);
+    deform(options);
     return all_well;
   }
   if (report_app->parsed()) {
