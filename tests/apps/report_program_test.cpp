@@ -10,6 +10,7 @@
 #include "apps/run_program.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
+#include "framework/io/npy.hpp"
 #include "framework/io/vtk_output.hpp"
 #include "support/test_meshes.hpp"
 
