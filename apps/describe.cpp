@@ -232,8 +232,13 @@ std::vector<std::string> known_words(std::string_view command, std::string_view 
   std::vector<std::string> words;
   if (option == "--interpolant") {
     for (const NamedRule& rule : named_rules()) words.emplace_back(rule.name);
+    // Baselines carry displacements, which are no map to export.
+    if (command != "export")
+      for (const NamedScatteredRule& rule : scattered_rules()) words.emplace_back(rule.name);
   } else if (option == "--reconstructor") {
     for (const ReconstructorEntry& entry : reconstructor_registry()) words.emplace_back(entry.name);
+  } else if (option == "--normals") {
+    words = {"gradient", "smooth"};
   } else if (option == "--outside") {
     words = {"error", "nearest", "mark"};
   } else if (option == "--precision") {
