@@ -301,8 +301,13 @@ void deform(const DeformOptions& given) {
   Binding binding = read_inputs(settings);
   const std::unique_ptr<FrameSource> source = open_frames(options.frames);
   if (source->num_vertices() != binding.num_vertices())
-    raise("{}: frames of {} vertices, but {} has {}", options.frames, source->num_vertices(), settings.rest.string(),
-          binding.num_vertices());
+    raise("{}: frames of {} vertices, but {} has {}{}", options.frames, source->num_vertices(), settings.rest.string(),
+          binding.num_vertices(),
+          source->num_vertices() == binding.points.rows()
+              ? fmt::format("; {} has as many: frames are those of the rest mesh, which moves the points (--rest and "
+                            "--points exchanged?)",
+                            settings.points.string())
+              : "");
   if (binding.on_surface() && source->num_columns() != 3)
     raise("{}: frames of {} coordinates, but {} is a surface in space", options.frames, source->num_columns(),
           settings.rest.string());

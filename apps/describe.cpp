@@ -6,6 +6,7 @@
 #include "framework/error.hpp"
 #include "framework/interpolation_rule.hpp"
 #include "framework/json_reader.hpp"
+#include "framework/scattered_transfer.hpp"
 #include "framework/version.hpp"
 #include "reconstruction/registry.hpp"
 

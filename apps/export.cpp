@@ -203,12 +203,12 @@ std::int64_t write_bones(const ExportOptions& options, const BindSettings& setti
 }
 
 std::unique_ptr<FrameSource> open_checked_frames(const ExportOptions& options, const std::filesystem::path& rest,
-                                                 const Mesh& mesh) {
+                                                 Index num_vertices) {
   if (options.step < 1) raise("--step {}: expected 1 or more", options.step);
   std::unique_ptr<FrameSource> source = open_frames(options.frames);
-  if (source->num_vertices() != mesh.num_vertices())
+  if (source->num_vertices() != num_vertices)
     raise("{}: frames of {} vertices, but {} has {}", options.frames, source->num_vertices(), rest.string(),
-          mesh.num_vertices());
+          num_vertices);
   const std::int64_t last = options.last < 0 ? source->num_frames() - 1 : options.last;
   if (options.first < 0 || options.first > last || last >= source->num_frames())
     raise("frames {} to {} asked for: {} has frames 0 to {}", options.first, last, options.frames,
@@ -234,14 +234,16 @@ void export_map(const ExportOptions& options) {
     raise("--precision {}: expected float or double", options.precision);
 
   Binding bound = read_inputs(settings);
-  if (bound.grid || bound.on_surface())
-    raise("{}: found a {}, maps are exported for meshes that fill their space", settings.rest.string(),
-          bound.grid ? "grid" : "surface");
+  if (bound.on_surface())
+    raise("{}: found a surface in space: what it carries follows its normals, so the map is no matrix; use deform",
+          settings.rest.string());
   const std::unique_ptr<FrameSource> source =
-      options.frames.empty() ? nullptr : open_checked_frames(options, settings.rest, bound.mesh);
+      options.frames.empty() ? nullptr : open_checked_frames(options, settings.rest, bound.num_vertices());
   locate(settings, bound);
   // Bones alone are shape functions; their transforms take the gradients.
   if (rule.needs_gradients() && (form != "bones" || source)) reconstruct(settings, bound);
+  // The same cells and vertices by the same numbers.
+  if (bound.grid) bound.mesh = bound.grid->mesh();
 
   std::string what;
   if (form == "bones") {

@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
@@ -120,12 +121,22 @@ void name_arguments(CLI::App& app) {
     raise("{}{}; {}", error.what(), error.get_name() == "ConversionError" ? ", expected a number" : "", more);
   const std::string& word = unknown.front();
   if (!parsed.empty() && word.front() != '-') raise("{}: expected an option before it; {}", word, more);
-  std::vector<std::string> names;
+  std::vector<std::string> names, owners;
+  const auto has = [&](const CommandFacts& any) {
+    return std::any_of(any.options.begin(), any.options.end(), [&](const OptionFacts& o) { return o.name == word; });
+  };
   if (parsed.empty())
-    for (const CommandFacts& known : facts.commands) names.push_back(known.name);
-  for (const std::vector<OptionFacts>& options : {command.options, facts.shared.options})
-    for (const OptionFacts& option : options)
+    for (const CommandFacts& known : facts.commands) {
+      names.push_back(known.name);
+      if (has(known)) owners.push_back("halfgrad " + known.name);
+    }
+  if (!owners.empty()) raise("{} belongs behind a command: {}; {}", word, fmt::join(owners, ", "), more);
+  if (std::error_code ignored; parsed.empty() && std::filesystem::exists(word, ignored))
+    raise("{} is a file, expected a command before it, such as halfgrad info {}; {}", word, word, more);
+  if (!parsed.empty())
+    for (const OptionFacts& option : command.options)
       if (!option.positional()) names.push_back(option.name);
+  for (const OptionFacts& option : facts.shared.options) names.push_back(option.name);
   const std::vector<std::string_view> known(names.begin(), names.end());
   const std::string nearest = nearest_name(word, known);
   raise("{} is no {} of {}; {}; {}", word, parsed.empty() ? "command" : "option", name,

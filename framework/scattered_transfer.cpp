@@ -191,11 +191,15 @@ ScatteredTransfer::ScatteredTransfer(const Mesh& mesh, const Points& points, con
   matrix_ = with_gradients(matrix_, rest_, points_, reconstruction.stencils);
 }
 
-ScatteredTransfer::ScatteredTransfer(const Mesh& mesh, const Points& points, Matrix weights)
-    : rest_(mesh.vertices()), points_(points), matrix_(std::move(weights)) {
-  if (matrix_.rows() != points.rows() || matrix_.cols() != mesh.num_vertices() || points.cols() != mesh.gdim())
-    raise("weights of {} x {}, expected {} points by {} vertices", matrix_.rows(), matrix_.cols(), points.rows(),
+ScatteredTransfer ScatteredTransfer::from_weights(const Mesh& mesh, const Points& points, Matrix weights) {
+  if (weights.rows() != points.rows() || weights.cols() != mesh.num_vertices() || points.cols() != mesh.gdim())
+    raise("weights of {} x {}, expected {} points by {} vertices", weights.rows(), weights.cols(), points.rows(),
           mesh.num_vertices());
+  ScatteredTransfer transfer;
+  transfer.rest_ = mesh.vertices();
+  transfer.points_ = points;
+  transfer.matrix_ = std::move(weights);
+  return transfer;
 }
 
 template <class Scalar>

@@ -50,7 +50,8 @@ class ScatteredTransfer {
   ScatteredTransfer(const Mesh& mesh, const Points& points, const ScatteredRule& rule,
                     const VertexGradientReconstructor* reconstructor = nullptr);
   /// With the weights of an earlier transfer, #points × #vertices. Throws Error where their size is another.
-  ScatteredTransfer(const Mesh& mesh, const Points& points, Eigen::SparseMatrix<double, Eigen::RowMajor> weights);
+  static ScatteredTransfer from_weights(const Mesh& mesh, const Points& points,
+                                        Eigen::SparseMatrix<double, Eigen::RowMajor> weights);
 
   /// Values at the points, #points × #columns, from deformed vertices, #vertices × #columns with #columns ≥ gdim: rest
   /// positions have zeros in the columns beyond gdim.
@@ -66,6 +67,7 @@ class ScatteredTransfer {
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix() const { return matrix_; }
 
  private:
+  ScatteredTransfer() = default;
   // M (values − rest) + points in the first columns, M values in the others.
   template <class Scalar>
   void apply(const Values<Scalar>& values, Eigen::Index num_positions, Values<Scalar>& out) const;

@@ -108,6 +108,16 @@ TEST_F(Program, UsageErrorsSayWhatToTypeNext) {
   EXPECT_THAT(run_program("dance").output, AllOf(HasSubstr("dance"), HasSubstr("deform, bind, report, export")));
   EXPECT_THAT(deform("--intepolant linear").output,
               AllOf(HasSubstr("did you mean --interpolant?"), HasSubstr("halfgrad deform --help")));
+  EXPECT_THAT(run_program("--outside nearest").output,
+              AllOf(HasSubstr("halfgrad deform, halfgrad bind"), HasSubstr("halfgrad --help")));
+  EXPECT_THAT(run_program(in("rest.vtu")).output, HasSubstr("halfgrad info " + in("rest.vtu")));
+  EXPECT_THAT(run_program("info " + in("rset.vtu")).output, HasSubstr("did you mean " + in("rest.vtu")));
+  EXPECT_THAT(deform("", "none/out.%d.obj").output, AllOf(HasSubstr("out.%d.obj"), HasSubstr("make the folder")));
+  write_npy(in("points.npy"), Values<double>(surface.points));
+  EXPECT_THAT(run_program("deform --rest " + in("rest.vtu") + " --frames " + in("points.npy") + " --points " +
+                          in("points.vtp") + " --out " + in("out.npy"))
+                  .output,
+              HasSubstr("--points exchanged?"));
   EXPECT_THAT(run_program("deform --rest").output, AllOf(HasSubstr("--rest"), HasSubstr("halfgrad deform --help")));
 }
 
