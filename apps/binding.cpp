@@ -90,8 +90,8 @@ void take_saved(const BindSettings& settings, Binding& binding) {
     raise("{}: the binding is damaged: its points are not bound as its settings say", settings.binding.string());
   };
   if (binding.by_vertices) {
-    binding.transfer = std::make_shared<const ScatteredTransfer>(binding.mesh, binding.points,
-                                                                 take(Eigen::SparseMatrix<double, Eigen::RowMajor>()));
+    binding.transfer = std::make_shared<const ScatteredTransfer>(ScatteredTransfer::from_weights(
+        binding.mesh, binding.points, take(Eigen::SparseMatrix<double, Eigen::RowMajor>())));
   } else if (binding.on_surface()) {
     binding.feet = take(SurfaceEmbedding());
     binding.feet.points = binding.points;

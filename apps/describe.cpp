@@ -45,7 +45,7 @@ std::string bash(const ProgramFacts& program) {
       }
       names.push_back(option.name);
       if (!option.value.empty())
-        values += fmt::format("    {}.{}) words=\"{}\" value=1 ;;\n", command.name, option.name, words);
+        values += fmt::format("    {}.{}) words=\"{}\" ;;\n", command.name, option.name, words);
     }
     options += fmt::format("    {}) options=\"{}\" ;;\n", command.name, fmt::join(names, " "));
   }
@@ -56,7 +56,7 @@ std::string bash(const ProgramFacts& program) {
       "# bash completion for halfgrad\n"
       "_halfgrad() {{\n"
       "  local current=${{COMP_WORDS[COMP_CWORD]}} previous=${{COMP_WORDS[COMP_CWORD-1]}}\n"
-      "  local command= word words= options=\"{}\" value=\n"
+      "  local command= word words= options=\"{}\"\n"
       "  for word in \"${{COMP_WORDS[@]:1:COMP_CWORD-1}}\"; do\n"
       "    case $word in {}) command=$word; break ;; esac\n"
       "  done\n"
@@ -71,7 +71,7 @@ std::string bash(const ProgramFacts& program) {
       "  case $command.$previous in\n"
       "{}"
       "  esac\n"
-      "  if [[ -z $value && $current == -* ]]; then words=$options; fi\n"
+      "  if [[ $current == -* ]]; then words=$options; fi\n"
       "  if [[ -n $words ]]; then COMPREPLY=($(compgen -W \"$words\" -- \"$current\")); fi\n"
       "}}\n"
       "complete -o default -F _halfgrad halfgrad\n",

@@ -85,7 +85,7 @@ CommandFacts facts_of(const CLI::App& app) {
     entry.required = option->get_required();
     entry.words = known_words(facts.name, entry.name);
     const std::string type = option->get_type_name();
-    if (option->get_items_expected() > 0)
+    if (option->get_items_expected_max() > 0)
       entry.value = type.starts_with("INT") || type.starts_with("FLOAT") ? "NUMBER" : type;
     facts.options.push_back(std::move(entry));
   }
@@ -102,7 +102,7 @@ ProgramFacts facts_of_program(const CLI::App& program) {
 // What --help shows as an option's argument; CLI11 calls both file names and words TEXT.
 void name_arguments(CLI::App& app) {
   for (CLI::Option* option : app.get_options())
-    if (option->get_items_expected() > 0 && option->get_type_name() == "TEXT")
+    if (option->get_items_expected_max() > 0 && option->get_type_name() == "TEXT")
       option->type_name(known_words(app.get_name(), option->get_name(option->get_positional())).empty() ? "FILE"
                                                                                                         : "WORD");
 }
