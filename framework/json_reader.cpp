@@ -52,6 +52,31 @@ std::string nearest_name(std::string_view word, const std::vector<std::string_vi
 
 std::string join_names(const std::vector<std::string_view>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
 
+std::string known_names(std::string_view word, const std::vector<std::string_view>& known) {
+  const std::string nearest = nearest_name(word, known);
+  return nearest.empty() ? join_names(known) : fmt::format("{}; did you mean \"{}\"?", join_names(known), nearest);
+}
+
+NamedOptions read_named_options(const json& specification, const std::string& pointer, std::string_view kind,
+                                const std::vector<std::string_view>& known) {
+  static const json none = json::object();
+  NamedOptions choice{"", pointer, &none};
+  if (specification.is_string()) {
+    choice.name = specification.get<std::string>();
+  } else if (specification.is_object() && specification.size() == 1) {
+    choice.name = specification.begin().key();
+    choice.pointer += "/" + choice.name;
+    choice.options = &specification.begin().value();
+  } else {
+    raise("{}: found {}, expected one {}: its name, or {{\"name\": {{options}}}}",
+          pointer.empty() ? kind : std::string_view(pointer), shown(specification), kind);
+  }
+  if (std::find(known.begin(), known.end(), choice.name) == known.end())
+    raise("{}: no {} \"{}\"; known: {}", pointer.empty() ? kind : std::string_view(pointer), kind, choice.name,
+          known_names(choice.name, known));
+  return choice;
+}
+
 JsonReader::JsonReader(const json& value, std::string pointer)
     : object_(&value), pointer_(std::move(pointer)), resolved_(std::make_unique<json>(json::object())) {
   if (!value.is_object())
@@ -136,11 +161,8 @@ std::string JsonReader::text(std::string_view key) {
 std::string JsonReader::choice(std::string_view key, const std::vector<std::string_view>& known,
                                std::string_view fallback) {
   const std::string word = text(key, fallback);
-  if (std::find(known.begin(), known.end(), word) == known.end()) {
-    const std::string nearest = nearest_name(word, known);
-    raise("{}: found \"{}\", expected one of {}{}", pointer_to(key), word, join_names(known),
-          nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
-  }
+  if (std::find(known.begin(), known.end(), word) == known.end())
+    raise("{}: found \"{}\", expected one of {}", pointer_to(key), word, known_names(word, known));
   return word;
 }
 
@@ -148,9 +170,7 @@ void JsonReader::finish() const {
   for (const auto& [key, value] : object_->items())
     if (std::find(known_.begin(), known_.end(), key) == known_.end()) {
       const std::vector<std::string_view> names(known_.begin(), known_.end());
-      const std::string nearest = nearest_name(key, names);
-      raise("{}: unknown key; known here: {}{}", pointer_to(key), names.empty() ? "none" : join_names(names),
-            nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
+      raise("{}: unknown key; known here: {}", pointer_to(key), names.empty() ? "none" : known_names(key, names));
     }
 }
 

@@ -1,5 +1,6 @@
 #include "reconstruction/registry.hpp"
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 
@@ -74,34 +75,17 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
 
 MadeReconstructor make_reconstructor(const nlohmann::json& specification, const std::string& pointer,
                                      std::span<const ReconstructorEntry> further) {
-  std::string name;
-  nlohmann::json options = nlohmann::json::object();
-  std::string where = pointer;
-  if (specification.is_string()) {
-    name = specification.get<std::string>();
-  } else if (specification.is_object() && specification.size() == 1) {
-    name = specification.begin().key();
-    options = specification.begin().value();
-    where += "/" + name;
-  } else {
-    raise("{}: found {}, expected a reconstructor's name or {{\"name\": {{options}}}}",
-          pointer.empty() ? "reconstructor" : pointer, specification.dump());
-  }
+  std::vector<ReconstructorEntry> entries(reconstructor_registry().begin(), reconstructor_registry().end());
+  entries.insert(entries.end(), further.begin(), further.end());
   std::vector<std::string_view> names;
-  for (const std::span<const ReconstructorEntry> entries : {reconstructor_registry(), further})
-    for (const ReconstructorEntry& entry : entries) {
-      if (entry.name == name) {
-        JsonReader reader(options, where);
-        MadeReconstructor made{name, "", entry.make(reader)};
-        reader.finish();
-        made.options = reader.resolved().dump();
-        return made;
-      }
-      names.push_back(entry.name);
-    }
-  const std::string nearest = nearest_name(name, names);
-  raise("{}: no reconstructor \"{}\"; known: {}{}", pointer.empty() ? "reconstructor" : pointer, name,
-        join_names(names), nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
+  for (const ReconstructorEntry& entry : entries) names.push_back(entry.name);
+  const NamedOptions chosen = read_named_options(specification, pointer, "reconstructor", names);
+  const auto entry = std::ranges::find(entries, chosen.name, &ReconstructorEntry::name);
+  JsonReader reader(*chosen.options, chosen.pointer);
+  MadeReconstructor made{chosen.name, "", entry->make(reader)};
+  reader.finish();
+  made.options = reader.resolved().dump();
+  return made;
 }
 
 }  // namespace halfgrad
