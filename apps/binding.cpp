@@ -11,6 +11,8 @@
 #include "framework/io/binding_file.hpp"
 #include "framework/io/formats.hpp"
 #include "framework/io/mesh_file.hpp"
+#include "framework/io/output_file.hpp"
+#include "framework/version.hpp"
 #include "reconstruction/registry.hpp"
 #include "reconstruction/surface_gradients.hpp"
 
@@ -69,6 +71,9 @@ void require_same(const std::string& given, const std::string& bound, const char
 
 BindSettings parse_settings(const BindOptions& options, std::string_view preferred) {
   BindSettings settings;
+  std::vector<std::string> limits = {"degenerate_cells=0"};
+  limits.insert(limits.end(), options.limits.begin(), options.limits.end());
+  settings.limits = Limits(limits);
   settings.binding = options.binding;
   settings.rest = options.rest;
   settings.points = options.points;
@@ -133,9 +138,7 @@ Binding read_inputs(const BindSettings& settings) {
     binding.mesh = std::get<Mesh>(std::move(rest));
     binding.quality = inspect(binding.mesh);
   }
-  if (const std::vector<Index>& flat = binding.quality.degenerate_cells; !flat.empty())
-    raise("{}: {} of {} cells have no volume, the first is cell {} ({})", settings.rest.string(), flat.size(),
-          binding.mesh.num_cells(), flat[0], element_name(binding.mesh, flat[0]));
+  settings.limits.check(settings.rest, mesh_faults(binding.quality));
   if ((binding.grid || binding.on_surface()) && !settings.binding.empty())
     raise("{}: saved bindings are those of meshes that fill their space; grids and surfaces are bound anew",
           settings.rest.string());
@@ -160,29 +163,56 @@ void locate(const BindSettings& settings, Binding& binding) {
     const EmbedOptions options{.outside = parse_outside(settings.outside)};
     binding.embedding =
         binding.grid ? embed(*binding.grid, binding.points, options) : embed(binding.mesh, binding.points, options);
-    return;
+  } else {
+    SavedBinding saved =
+        read_binding(settings.binding, binding.mesh, static_cast<Index>(binding.points.rows()), binding.fingerprint);
+    binding.embedding = std::move(saved.embedding);
+    binding.reconstruction = std::move(saved.reconstruction);
   }
-  SavedBinding saved =
-      read_binding(settings.binding, binding.mesh, static_cast<Index>(binding.points.rows()), binding.fingerprint);
-  binding.embedding = std::move(saved.embedding);
-  binding.reconstruction = std::move(saved.reconstruction);
+  settings.limits.check(settings.points, point_faults(binding.embedding));
 }
 
 void reconstruct(const BindSettings& settings, Binding& binding) {
-  if (binding.reconstruction) return;
-  const MadeReconstructor made = make_reconstructor(json::parse(settings.specification), "--reconstructor");
-  const VertexGradientReconstructor& reconstructor = *made.reconstructor;
-  if (binding.grid)
-    binding.reconstruction =
-        reconstructor.reconstruct_on_grid(*binding.grid, active_vertices(*binding.grid, binding.embedding));
-  else if (binding.on_surface())
-    binding.reconstruction = surface_gradients(reconstructor, binding.mesh, active_vertices(binding.feet.feet));
-  else
-    binding.reconstruction =
-        reconstructor.reconstruct(CellGradients(binding.mesh), active_vertices(binding.mesh, binding.embedding));
+  if (!binding.reconstruction) {
+    const MadeReconstructor made = make_reconstructor(json::parse(settings.specification), "--reconstructor");
+    const VertexGradientReconstructor& reconstructor = *made.reconstructor;
+    if (binding.grid)
+      binding.reconstruction =
+          reconstructor.reconstruct_on_grid(*binding.grid, active_vertices(*binding.grid, binding.embedding));
+    else if (binding.on_surface())
+      binding.reconstruction = surface_gradients(reconstructor, binding.mesh, active_vertices(binding.feet.feet));
+    else
+      binding.reconstruction =
+          reconstructor.reconstruct(CellGradients(binding.mesh), active_vertices(binding.mesh, binding.embedding));
+  }
+  settings.limits.check(settings.rest, gradient_faults(binding.reconstruction->stencils));
 }
 
-void save_binding(const BindOptions& options, const std::filesystem::path& out, bool quiet) {
+nlohmann::ordered_json diagnosis(const BindSettings& settings, const Binding& binding) {
+  nlohmann::ordered_json result;
+  if (!binding.grid) {
+    result["mesh"] = to_json(mesh_faults(binding.quality));
+    result["mesh"]["min_quality"] = binding.quality.min_quality;
+  }
+  if (binding.reconstruction) {
+    result["vertex_rules"] = rule_counts(binding.reconstruction->stencils);
+    result["vertices_by_rule"] = vertices_by_rule(binding.reconstruction->stencils);
+  }
+  double farthest = 0;
+  nlohmann::ordered_json points = nlohmann::ordered_json::array();
+  for (const OutsidePoint& outside : binding.embedding.outside) {
+    farthest = std::max(farthest, outside.distance);
+    points.push_back({{"point", outside.point}, {"distance", outside.distance}});
+  }
+  result["outside"] = {{"policy", settings.outside},
+                       {"count", binding.embedding.outside.size()},
+                       {"max_distance", farthest},
+                       {"points", points}};
+  return result;
+}
+
+void save_binding(const BindOptions& options, const std::filesystem::path& out, const std::filesystem::path& report,
+                  bool quiet) {
   if (out.extension() != ".hgb") raise("--out {}: expected a name that ends in .hgb", out.string());
   const BindSettings settings = parse_settings(options);
   Binding binding = read_inputs(settings);
@@ -192,10 +222,30 @@ void save_binding(const BindOptions& options, const std::filesystem::path& out, 
   locate(settings, binding);
   if (settings.rule.needs_gradients()) reconstruct(settings, binding);
   write_binding(out, {settings.to_json(), binding.fingerprint, binding.embedding, binding.reconstruction});
+  if (!report.empty()) {
+    nlohmann::ordered_json facts = {{"version", version},
+                                    {"rest", settings.rest.string()},
+                                    {"points", settings.points.string()},
+                                    {"out", out.string()},
+                                    {"interpolant", settings.interpolant},
+                                    {"reconstructor", json(nullptr)},
+                                    {"options", json::parse(settings.reconstructor_options)},
+                                    {"counts",
+                                     {{"points", binding.embedding.num_points()},
+                                      {"vertices", binding.num_vertices()},
+                                      {"cells", binding.mesh.num_cells()}}}};
+    if (settings.rule.needs_gradients()) facts["reconstructor"] = settings.reconstructor;
+    facts.update(diagnosis(settings, binding));
+    write_text_atomically(report, facts.dump(2) + "\n");
+  }
   if (quiet) return;
   fmt::print("{} points bound to {} written to {}\n", binding.embedding.num_points(), settings.rest.string(),
              out.string());
-  if (!binding.embedding.outside.empty()) fmt::print("{} points outside the mesh\n", binding.embedding.outside.size());
+  std::vector<Fault> faults = mesh_faults(binding.quality);
+  for (Fault& fault : point_faults(binding.embedding)) faults.push_back(std::move(fault));
+  if (binding.reconstruction)
+    for (Fault& fault : gradient_faults(binding.reconstruction->stencils)) faults.push_back(std::move(fault));
+  fmt::print("{}", fault_lines(faults));
 }
 
 }  // namespace halfgrad::app

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/diagnosis.hpp"
 #include "framework/embedding.hpp"
 #include "framework/gradient_stencils.hpp"
 #include "framework/grid.hpp"
@@ -24,6 +25,7 @@ struct BindOptions {
   /// drift.
   std::string reconstructor;
   std::optional<std::string> outside;
+  std::vector<std::string> limits;  ///< NAME=NUMBER each, besides degenerate_cells=0; see Limits
 };
 
 /// Options read and checked, before any large file is opened.
@@ -33,6 +35,7 @@ struct BindSettings {
   InterpolationRule rule;
   std::string reconstructor, reconstructor_options;  ///< name and compact JSON object
   std::string specification;                         ///< JSON that make_reconstructor reads
+  Limits limits;
 
   std::string to_json() const;
 };
@@ -58,14 +61,18 @@ struct Binding {
   Index num_vertices() const { return grid ? grid->num_vertices() : mesh.num_vertices(); }
 };
 
-/// Reads the rest shape and the points. Throws Error on degenerate cells.
+/// Reads the rest shape and the points. This and the next two throw Error on faults beyond the limits.
 Binding read_inputs(const BindSettings& settings);
 /// Locates the points, or takes them from the saved binding.
 void locate(const BindSettings& settings, Binding& binding);
 /// Reconstructs gradients at the vertices that the points need, unless the saved binding has them.
 void reconstruct(const BindSettings& settings, Binding& binding);
 
-/// Runs `halfgrad bind`.
-void save_binding(const BindOptions& options, const std::filesystem::path& out, bool quiet);
+/// What reports say of a binding: faults of the mesh, the rules that served its vertices, points outside.
+nlohmann::ordered_json diagnosis(const BindSettings& settings, const Binding& binding);
+
+/// Runs `halfgrad bind`; `report` is a JSON file, or empty for none.
+void save_binding(const BindOptions& options, const std::filesystem::path& out, const std::filesystem::path& report,
+                  bool quiet);
 
 }  // namespace halfgrad::app

@@ -62,16 +62,6 @@ class SignalWatch {
   void (*terminate_)(int);
 };
 
-json vertex_rules(const GradientStencilTable& table) {
-  constexpr std::array names = {"average", "full_fit", "wider_patch", "damped", "cell_value", "none"};
-  json counts = json::object();
-  for (const StencilDiagnostics& row : table.diagnostics) {
-    json& count = counts[names[static_cast<std::size_t>(row.rule)]];
-    count = count.is_null() ? 1 : count.get<std::int64_t>() + 1;
-  }
-  return counts;
-}
-
 // Signed: behind the surface's normals is negative.
 json distance_range(const std::vector<double>& distance) {
   if (distance.empty()) return {{"least", 0.0}, {"greatest", 0.0}};
@@ -105,8 +95,8 @@ std::string run_name(const DeformOptions& options, const BindSettings& settings,
   return print.text();
 }
 
-// How many of the first `most` frames come from files older than the interrupted run. Times of files advance in ticks, so
-// one of the same tick may be newer.
+// How many of the first `most` frames come from files older than the interrupted run. Times of files advance in ticks,
+// so one of the same tick may be newer.
 Index num_unchanged(const FrameSource& source, const FrameRange& range, const std::filesystem::path& mark, Index most) {
   std::error_code absent;
   const auto begun = std::filesystem::last_write_time(mark, absent);
@@ -181,7 +171,6 @@ Tally run_frames(const DeformOptions& options, const BindSettings& settings, con
 
 json report_of(const DeformOptions& options, const BindSettings& settings, const Binding& binding, const Tally& tally) {
   const BindReport& bound = tally.report;
-  const MeshReport& quality = binding.quality;
   json report;
   report["counts"] = {{"frames", tally.written + tally.resumed},
                       {"resumed_frames", tally.resumed},
@@ -210,22 +199,8 @@ json report_of(const DeformOptions& options, const BindSettings& settings, const
   report["reconstructor"] = settings.rule.needs_gradients() ? json(settings.reconstructor) : json(nullptr);
   report["options"] = json::parse(settings.reconstructor_options);
   report["precision"] = options.precision;
-  report["mesh"] = {{"inverted_cells", quality.inverted_cells.size()},
-                    {"folded_cells", quality.folded_cells.size()},
-                    {"unused_vertices", quality.unused_vertices.size()},
-                    {"min_quality", quality.min_quality}};
-  if (binding.reconstruction) report["vertex_rules"] = vertex_rules(binding.reconstruction->stencils);
+  report.update(json(diagnosis(settings, binding)));
   if (binding.on_surface()) report["distance"] = distance_range(binding.feet.distance);
-  double farthest = 0;
-  json outside_points = json::array();
-  for (const OutsidePoint& outside : binding.embedding.outside) {
-    farthest = std::max(farthest, outside.distance);
-    outside_points.push_back({{"point", outside.point}, {"distance", outside.distance}});
-  }
-  report["outside"] = {{"policy", settings.outside},
-                       {"count", binding.embedding.outside.size()},
-                       {"max_distance", farthest},
-                       {"points", outside_points}};
   return report;
 }
 
