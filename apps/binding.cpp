@@ -12,6 +12,7 @@
 #include "framework/io/formats.hpp"
 #include "framework/io/mesh_file.hpp"
 #include "framework/io/output_file.hpp"
+#include "framework/json_reader.hpp"
 #include "framework/version.hpp"
 #include "reconstruction/registry.hpp"
 #include "reconstruction/surface_gradients.hpp"
@@ -30,11 +31,7 @@ json parse_reconstructor(const std::string& text, const InterpolationRule& rule,
   if (text.empty())
     return find_format(rest, FormatUse::read_mesh).read_grid != nullptr ? "centered_difference" : json(preferred);
   if ((text[0] != '{' && text[0] != '"')) return text;
-  try {
-    return json::parse(text);
-  } catch (const json::parse_error& error) {
-    raise("--reconstructor {}: {}", text, error.what());
-  }
+  return parse_json(text, "--reconstructor");
 }
 
 Outside parse_outside(const std::string& word) {

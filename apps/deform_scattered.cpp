@@ -11,6 +11,7 @@
 #include "framework/io/mesh_file.hpp"
 #include "framework/io/output_file.hpp"
 #include "framework/io/point_set.hpp"
+#include "framework/json_reader.hpp"
 #include "framework/version.hpp"
 #include "reconstruction/registry.hpp"
 
@@ -40,11 +41,7 @@ std::int64_t carry_frames(const DeformOptions& options, const ScatteredTransfer&
 /// A name, or JSON with options.
 json parse_name(const std::string& text, const char* option) {
   if (text.empty() || text[0] != '{') return text;
-  try {
-    return json::parse(text);
-  } catch (const json::parse_error& error) {
-    raise("{} {}: {}", option, text, error.what());
-  }
+  return parse_json(text, option);
 }
 
 }  // namespace
