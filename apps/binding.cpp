@@ -12,7 +12,7 @@
 #include "framework/io/formats.hpp"
 #include "framework/io/mesh_file.hpp"
 #include "framework/io/output_file.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
 #include "framework/version.hpp"
 #include "reconstruction/registry.hpp"
 #include "reconstruction/surface_gradients.hpp"
@@ -134,8 +134,9 @@ Binding read_inputs(const BindSettings& settings) {
   } else {
     binding.mesh = std::get<Mesh>(std::move(rest));
     binding.quality = inspect(binding.mesh);
+    binding.faults = mesh_faults(binding.mesh, binding.quality);
   }
-  settings.limits.check(settings.rest, mesh_faults(binding.quality));
+  settings.limits.check(settings.rest, binding.faults);
   if ((binding.grid || binding.on_surface()) && !settings.binding.empty())
     raise("{}: saved bindings are those of meshes that fill their space; grids and surfaces are bound anew",
           settings.rest.string());
@@ -188,7 +189,7 @@ void reconstruct(const BindSettings& settings, Binding& binding) {
 nlohmann::ordered_json diagnosis(const BindSettings& settings, const Binding& binding) {
   nlohmann::ordered_json result;
   if (!binding.grid) {
-    result["mesh"] = to_json(mesh_faults(binding.quality));
+    result["mesh"] = to_json(binding.faults);
     result["mesh"]["min_quality"] = binding.quality.min_quality;
   }
   if (binding.reconstruction) {
@@ -238,7 +239,7 @@ void save_binding(const BindOptions& options, const std::filesystem::path& out, 
   if (quiet) return;
   fmt::print("{} points bound to {} written to {}\n", binding.embedding.num_points(), settings.rest.string(),
              out.string());
-  std::vector<Fault> faults = mesh_faults(binding.quality);
+  std::vector<Fault> faults = binding.faults;
   for (Fault& fault : point_faults(binding.embedding)) faults.push_back(std::move(fault));
   if (binding.reconstruction)
     for (Fault& fault : gradient_faults(binding.reconstruction->stencils)) faults.push_back(std::move(fault));

@@ -46,9 +46,10 @@ BindSettings parse_settings(const BindOptions& options, std::string_view preferr
 
 /// What binding took and gave.
 struct Binding {
-  std::optional<Grid> grid;  ///< instead of a mesh
-  Mesh mesh;                 ///< a surface in space too
-  MeshReport quality;        ///< of a mesh
+  std::optional<Grid> grid;   ///< instead of a mesh
+  Mesh mesh;                  ///< a surface in space too
+  MeshReport quality;         ///< of a mesh
+  std::vector<Fault> faults;  ///< of a mesh
   PointSet surface;
   Points points;  ///< of the surface, in the mesh's dimension
   std::string fingerprint;

@@ -11,7 +11,7 @@
 #include "framework/io/mesh_file.hpp"
 #include "framework/io/output_file.hpp"
 #include "framework/io/point_set.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
 #include "framework/version.hpp"
 #include "reconstruction/registry.hpp"
 

@@ -8,7 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
+#include "framework/mesh_faults.hpp"
 
 namespace halfgrad::app {
 
@@ -62,18 +63,20 @@ std::vector<std::string_view> fault_names() {
   return names;
 }
 
-std::vector<Fault> mesh_faults(const MeshReport& report) {
+std::vector<Fault> mesh_faults(const Mesh& mesh, const MeshReport& report) {
   std::vector<Fault> faults = {listed("degenerate_cells", report.degenerate_cells),
                                listed("inverted_cells", report.inverted_cells),
                                listed("folded_cells", report.folded_cells),
-                               listed("duplicate_cells", report.duplicate_cells),
-                               listed("duplicate_vertices", report.duplicate_vertices),
+                               listed("duplicate_cells", duplicate_cells(mesh)),
+                               listed("duplicate_vertices", duplicate_vertices(mesh)),
                                listed("unused_vertices", report.unused_vertices)};
-  Fault& facets = faults.emplace_back("nonmanifold_facets", static_cast<double>(report.nonmanifold_facets.size()));
-  for (std::size_t i = 0; i < std::min(most_listed, report.nonmanifold_facets.size()); ++i) {
-    const FacetKey& key = report.nonmanifold_facets[i];
-    facets.first.emplace_back(key.begin(), std::find(key.begin(), key.end(), std::numeric_limits<Index>::max()));
-  }
+  Fault& facets =
+      faults.emplace_back(Fault{"nonmanifold_facets", static_cast<double>(report.num_nonmanifold_facets), {}});
+  if (report.num_nonmanifold_facets == 0) return faults;
+  const std::vector<FacetKey> keys = nonmanifold_facets(mesh);
+  for (std::size_t i = 0; i < std::min(most_listed, keys.size()); ++i)
+    facets.first.emplace_back(keys[i].begin(),
+                              std::find(keys[i].begin(), keys[i].end(), std::numeric_limits<Index>::max()));
   return faults;
 }
 

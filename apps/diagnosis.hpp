@@ -19,8 +19,8 @@ struct Fault {
   std::vector<std::vector<Index>> first;  ///< up to ten: a cell, vertex or point each, or the vertices of a facet
 };
 
-/// All faults of a mesh, those that it has not too, with amount zero.
-std::vector<Fault> mesh_faults(const MeshReport& report);
+/// All faults of a mesh, those that it has not too, with amount zero; `report` is inspect(mesh).
+std::vector<Fault> mesh_faults(const Mesh& mesh, const MeshReport& report);
 /// Points outside, and the distance of the farthest.
 std::vector<Fault> point_faults(const Embedding& embedding);
 /// Vertices whose stencil is not the one asked for.

@@ -70,7 +70,7 @@ void info(const std::filesystem::path& path, const std::vector<std::string>& lim
   const Limits accepted(limits);
   const Mesh mesh = read_mesh(path);
   const MeshReport report = inspect(mesh);
-  const std::vector<Fault> faults = mesh_faults(report);
+  const std::vector<Fault> faults = mesh_faults(mesh, report);
   json facts;
   facts["file"] = path.string();
   facts["dimension"] = mesh.gdim();

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 

@@ -5,7 +5,7 @@
 
 #include "framework/error.hpp"
 #include "framework/io/input_file.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 

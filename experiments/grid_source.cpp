@@ -5,6 +5,7 @@
 
 #include "experiments/per_axis.hpp"
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
@@ -53,7 +54,7 @@ Occupancy read_occupancy(JsonReader& reader, int gdim) {
 
 GridSource read_grid_source(const json& specification, const std::string& pointer, json& resolved) {
   JsonReader reader(specification, pointer);
-  const auto gdim = reader.small_integer("dimension", 3);
+  const auto gdim = small_integer(reader, "dimension", 3);
   if (gdim < 1 || gdim > 3) raise("{}: found {}, expected 1 to 3", reader.pointer_to("dimension"), gdim);
   const auto cells = per_axis<int>(reader, "cells", 8, gdim);
   const auto size = per_axis<double>(reader, "size", 1, gdim);

@@ -8,7 +8,7 @@
 #include "experiments/interactive_report.hpp"
 #include "framework/error.hpp"
 #include "framework/io/output_file.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 

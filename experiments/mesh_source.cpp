@@ -11,7 +11,7 @@
 #include "framework/error.hpp"
 #include "framework/io/formats.hpp"
 #include "framework/io/mesh_file.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
@@ -86,10 +86,10 @@ MeshSource random_delaunay_source(const json& specification, const std::string& 
                                   std::uint64_t seed, json& resolved) {
   JsonReader reader(specification, pointer);
   RandomDelaunayOptions options;
-  options.gdim = reader.small_integer("dimension", options.gdim);
+  options.gdim = small_integer(reader, "dimension", options.gdim);
   if (options.gdim != 2 && options.gdim != 3)
     raise("{}: found {}, expected 2 or 3", reader.pointer_to("dimension"), options.gdim);
-  options.num_points = reader.small_integer("vertices", options.num_points);
+  options.num_points = small_integer(reader, "vertices", options.num_points);
   reader.finish();
   resolved = reader.resolved();
   const auto at_level = [=](int level) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 

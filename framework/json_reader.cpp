@@ -2,35 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
 using nlohmann::json;
 
 namespace {
-
-// What a reader was found to be, short enough for a message.
-std::string shown(const json& value) {
-  std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
-  if (text.size() > 60) text = text.substr(0, 57) + "...";
-  return fmt::format("{} {}", value.type_name(), text);
-}
-
-std::int64_t whole_number(const json& value, std::string_view pointer) {
-  if (value.is_number_integer() && !(value.is_number_unsigned() && value.get<std::uint64_t>() > INT64_MAX))
-    return value.get<std::int64_t>();
-  // 1e6 is how people write a million.
-  if (value.is_number_float()) {
-    const double number = value.get<double>();
-    if (std::abs(number) < 9e15 && number == std::floor(number)) return static_cast<std::int64_t>(number);
-  }
-  raise("{}: found {}, expected a whole number", pointer, shown(value));
-}
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -48,27 +30,6 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }
 
 }  // namespace
-
-json parse_json(std::string_view text, std::string_view name) {
-  // What walks a document later recurses into it.
-  constexpr int most_levels = 100;
-  const auto check_depth = [&](int depth, json::parse_event_t, json&) {
-    if (depth > most_levels) raise("{}: nested deeper than {} levels", name, most_levels);
-    return true;
-  };
-  try {
-    return json::parse(text, check_depth);
-  } catch (const json::exception& error) {
-    raise("{}: not JSON: {}", name, error.what());
-  }
-}
-
-int small_integer(const json& value, std::string_view pointer) {
-  const std::int64_t number = whole_number(value, pointer);
-  if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max())
-    raise("{}: found {}, expected at most {} in size", pointer, number, std::numeric_limits<int>::max());
-  return static_cast<int>(number);
-}
 
 std::string nearest_name(std::string_view word, const std::vector<std::string_view>& known) {
   std::string best;
@@ -88,7 +49,7 @@ std::string join_names(const std::vector<std::string_view>& names) { return fmt:
 JsonReader::JsonReader(const json& value, std::string pointer)
     : object_(&value), pointer_(std::move(pointer)), resolved_(std::make_unique<json>(json::object())) {
   if (!value.is_object())
-    raise("{}: found {}, expected an object", pointer_.empty() ? "the document" : pointer_, shown(value));
+    raise("{}: found {}, expected an object", pointer_.empty() ? "the document" : pointer_, described(value));
 }
 
 JsonReader::~JsonReader() = default;
@@ -122,21 +83,17 @@ double JsonReader::number(std::string_view key, double fallback) {
 double JsonReader::number(std::string_view key) {
   const json& value = at(key);
   if (!value.is_number() || !std::isfinite(value.get<double>()))
-    raise("{}: found {}, expected a finite number", pointer_to(key), shown(value));
+    raise("{}: found {}, expected a finite number", pointer_to(key), described(value));
   return value.get<double>();
 }
 
 std::int64_t JsonReader::integer(std::string_view key, std::int64_t fallback) {
-  if (has(key)) return whole_number(at(key), pointer_to(key));
+  if (has(key)) return integer(key);
   record(key, fallback);
   return fallback;
 }
 
-int JsonReader::small_integer(std::string_view key, int fallback) {
-  if (has(key)) return halfgrad::small_integer(at(key), pointer_to(key));
-  record(key, fallback);
-  return fallback;
-}
+std::int64_t JsonReader::integer(std::string_view key) { return whole_number(at(key), pointer_to(key)); }
 
 bool JsonReader::boolean(std::string_view key, bool fallback) {
   if (!has(key)) {
@@ -144,7 +101,7 @@ bool JsonReader::boolean(std::string_view key, bool fallback) {
     return fallback;
   }
   const json& value = at(key);
-  if (!value.is_boolean()) raise("{}: found {}, expected true or false", pointer_to(key), shown(value));
+  if (!value.is_boolean()) raise("{}: found {}, expected true or false", pointer_to(key), described(value));
   return value.get<bool>();
 }
 
@@ -156,7 +113,7 @@ std::string JsonReader::text(std::string_view key, std::string_view fallback) {
 
 std::string JsonReader::text(std::string_view key) {
   const json& value = at(key);
-  if (!value.is_string()) raise("{}: found {}, expected a string", pointer_to(key), shown(value));
+  if (!value.is_string()) raise("{}: found {}, expected a string", pointer_to(key), described(value));
   return value.get<std::string>();
 }
 

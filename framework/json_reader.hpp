@@ -24,8 +24,7 @@ class JsonReader {
   double number(std::string_view key, double fallback);
   double number(std::string_view key);
   std::int64_t integer(std::string_view key, std::int64_t fallback);
-  /// The same, within the range of int.
-  int small_integer(std::string_view key, int fallback);
+  std::int64_t integer(std::string_view key);
   bool boolean(std::string_view key, bool fallback);
   std::string text(std::string_view key, std::string_view fallback);
   std::string text(std::string_view key);
@@ -50,12 +49,6 @@ class JsonReader {
   std::vector<std::string> known_;
   std::unique_ptr<nlohmann::json> resolved_;
 };
-
-/// Parses JSON text. Throws Error that begins with `name` where it is malformed or nested deeper than 100 levels.
-nlohmann::json parse_json(std::string_view text, std::string_view name);
-
-/// A value that must be a whole number within int; 1e6 is one too. Throws Error that names the pointer.
-int small_integer(const nlohmann::json& value, std::string_view pointer);
 
 /// The entry of `known` closest to `word` by edit distance, or empty where none is near.
 std::string nearest_name(std::string_view word, const std::vector<std::string_view>& known);

@@ -2,7 +2,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -45,60 +44,6 @@ void for_each_facet(const std::vector<FacetKey>& sorted, Function&& f) {
     f(sorted[i], j - i);
     i = j;
   }
-}
-
-// The numbers from 0 to count − 1 whose item equals that of a lower number.
-template <class Hash, class Equal>
-std::vector<Index> later_twins(Index count, Hash&& hash, Equal&& equal) {
-  const std::size_t mask = std::bit_ceil(2 * static_cast<std::size_t>(count) + 1) - 1;
-  std::vector<Index> first_of(mask + 1, -1), twins;
-  for (Index i = 0; i < count; ++i) {
-    std::size_t at = hash(i) & mask;
-    while (first_of[at] >= 0 && !equal(first_of[at], i)) at = (at + 1) & mask;
-    if (first_of[at] < 0)
-      first_of[at] = i;
-    else
-      twins.push_back(i);
-  }
-  return twins;
-}
-
-std::uint64_t mixed(std::uint64_t hash, std::uint64_t more) {
-  hash = (hash ^ more) * 0x9e3779b97f4a7c15;
-  return hash ^ hash >> 29;
-}
-
-std::vector<Index> duplicate_vertices(const Points& vertices) {
-  return later_twins(
-      static_cast<Index>(vertices.rows()),
-      [&](Index v) {
-        std::uint64_t hash = 0;
-        // −0 + 0 is 0, which it equals.
-        for (double x : vertices.row(v)) hash = mixed(hash, std::bit_cast<std::uint64_t>(x + 0.0));
-        return hash;
-      },
-      [&](Index v, Index w) { return vertices.row(v) == vertices.row(w); });
-}
-
-std::vector<Index> duplicate_cells(const Mesh& mesh) {
-  std::vector<std::array<Index, max_nodes>> cells;
-  cells.reserve(mesh.num_cells());
-  for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
-    for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
-      auto& cell = cells.emplace_back();
-      cell.fill(-1);
-      std::copy_n(block.cells.row(c).data(), E::num_nodes, cell.data());
-      std::sort(cell.begin(), cell.begin() + E::num_nodes);
-    }
-  });
-  return later_twins(
-      mesh.num_cells(),
-      [&](Index c) {
-        std::uint64_t hash = 0;
-        for (Index v : cells[c]) hash = mixed(hash, static_cast<std::uint64_t>(v));
-        return hash;
-      },
-      [&](Index c, Index d) { return cells[c] == cells[d]; });
 }
 
 // Node positions as the inspection sees them: those of a surface's cell in the cell's own plane.
@@ -273,12 +218,10 @@ MeshReport inspect(const Mesh& mesh) {
       quality_sum += quality;
     }
   });
-  for_each_facet(sorted(all_facets(mesh), mesh.num_vertices()), [&](const FacetKey& key, std::size_t count) {
+  for_each_facet(sorted(all_facets(mesh), mesh.num_vertices()), [&](const FacetKey&, std::size_t count) {
     if (count == 1) ++report.num_boundary_facets;
-    if (count > 2) report.nonmanifold_facets.push_back(key);
+    if (count > 2) ++report.num_nonmanifold_facets;
   });
-  report.duplicate_vertices = duplicate_vertices(mesh.vertices());
-  report.duplicate_cells = duplicate_cells(mesh);
   for (Index v = 0; v < mesh.num_vertices(); ++v)
     if (!used[v]) report.unused_vertices.push_back(v);
   if (mesh.num_cells() == 0) {

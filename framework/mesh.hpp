@@ -129,12 +129,9 @@ struct MeshReport {
   std::vector<Index> inverted_cells;    ///< det J negative at some node (accepted; weights do not depend on the sign)
   std::vector<Index> folded_cells;      ///< det J changes sign within the cell: its inverse map is not unique
   std::vector<Index> unused_vertices;   ///< in no cell
-  /// At the position, to the bit, of a vertex of lower number: cells on the two sides of such a seam are not connected.
-  std::vector<Index> duplicate_vertices;
-  std::vector<Index> duplicate_cells;        ///< of the same vertices, in any order, as a cell of lower number
-  std::vector<FacetKey> nonmanifold_facets;  ///< shared by three cells or more
   Index num_boundary_facets = 0;
-  double volume = 0;  ///< Σ|det J(center)| · reference volume, in length^gdim
+  Index num_nonmanifold_facets = 0;  ///< shared by three cells or more
+  double volume = 0;                 ///< Σ|det J(center)| · reference volume, in length^gdim
   double mean_edge = 0, min_edge = 0, max_edge = 0;
   double min_quality = 0, mean_quality = 0;  ///< least |det J| at a node over the product of its edge lengths, 0 … 1
 };

@@ -20,7 +20,7 @@ void expect_valid(const Mesh& mesh) {
   EXPECT_TRUE(report.inverted_cells.empty());
   EXPECT_TRUE(report.folded_cells.empty());
   EXPECT_TRUE(report.unused_vertices.empty());
-  EXPECT_TRUE(report.nonmanifold_facets.empty());
+  EXPECT_EQ(report.num_nonmanifold_facets, 0);
 }
 
 TEST(Lattice, EveryPatternFillsTheBoxRegularOrNot) {
