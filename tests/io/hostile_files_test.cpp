@@ -87,6 +87,14 @@ TEST_F(HostileFiles, BindingsAreWhatTheWriterWritesAndNothingElse) {
   EXPECT_THAT(message("\xa1\x70halfgrad_binding\x61\xff"), HasSubstr("version"));
 }
 
+TEST_F(HostileFiles, ElementsBeforeTheirNodesAreRefused) {
+  EXPECT_THAT(
+      message_of([&] {
+        read_mesh(file("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Elements\n1\n1 15 0 1\n$EndElements\n"));
+      }),
+      AllOf(HasSubstr("a.msh:6"), HasSubstr("$Nodes before")));
+}
+
 TEST_F(HostileFiles, DeeplyNestedJsonIsRefused) {
   EXPECT_THAT(message_of([] { parse_json(std::string(100'000, '['), "x.json"); }),
               AllOf(HasSubstr("x.json"), HasSubstr("nested deeper than 100")));
