@@ -102,7 +102,12 @@ constexpr Target targets[] = {
     {"obj", "x.obj", read_geometry},
     {"ply", "x.ply", read_geometry},
     {"stl", "x.stl", read_geometry},
-    {"npy", "x.npy", [](const char* path) { read_geometry(path), read_frames(path); }},
+    {"npy", "x.npy",
+     [](const char* path) {
+       read_geometry(path);
+       read_frames(path);
+       read_or_refuse([&] { read_npy(path); });
+     }},
     {"pc2", "x.pc2", read_frames},
     {"pvd", "x.pvd", read_frames},
     {"field", "x.vtu", read_field},

@@ -4,6 +4,7 @@
 
 #include "framework/io/binding_file.hpp"
 #include "framework/io/mesh_file.hpp"
+#include "framework/io/npy.hpp"
 #include "framework/io/point_set.hpp"
 #include "framework/json_values.hpp"
 #include "io/io_support.hpp"
@@ -93,6 +94,14 @@ TEST_F(HostileFiles, ElementsBeforeTheirNodesAreRefused) {
         read_mesh(file("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Elements\n1\n1 15 0 1\n$EndElements\n"));
       }),
       AllOf(HasSubstr("a.msh:6"), HasSubstr("$Nodes before")));
+}
+
+TEST_F(HostileFiles, ArraysWithoutColumnsHaveNoRows) {
+  std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000000000, 0), }";
+  header.resize(118, ' ');
+  file("a.npy", std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header);
+  EXPECT_THAT(message_of([&] { read_npy(file("a.npy")); }),
+              AllOf(HasSubstr("a.npy"), HasSubstr("(1000000000000000000, 0)")));
 }
 
 TEST_F(HostileFiles, DeeplyNestedJsonIsRefused) {
