@@ -12,6 +12,9 @@
 #include "framework/io/binding_file.hpp"
 #include "framework/io/formats.hpp"
 #include "framework/io/mesh_file.hpp"
+#include "framework/io/output_file.hpp"
+#include "framework/json_values.hpp"
+#include "framework/version.hpp"
 #include "reconstruction/registry.hpp"
 #include "reconstruction/surface_gradients.hpp"
 
@@ -24,11 +27,7 @@ namespace {
 // A name, or JSON with options.
 json parse_name(const std::string& text, const char* option) {
   if (text.empty() || (text[0] != '{' && text[0] != '"')) return text;
-  try {
-    return json::parse(text);
-  } catch (const json::parse_error& error) {
-    raise("{} {}: {}", option, text, error.what());
-  }
+  return parse_json(text, option);
 }
 
 // Where the user names none: what the command prefers, on grids the rule that lists no cells, for baselines the
@@ -105,6 +104,9 @@ void take_saved(const BindSettings& settings, Binding& binding) {
 
 BindSettings parse_settings(const BindOptions& options, std::string_view preferred) {
   BindSettings settings;
+  std::vector<std::string> limits = {"degenerate_cells=0"};
+  limits.insert(limits.end(), options.limits.begin(), options.limits.end());
+  settings.limits = Limits(limits);
   settings.binding = options.binding;
   settings.rest = options.rest;
   settings.points = options.points;
@@ -174,10 +176,10 @@ Binding read_inputs(const BindSettings& settings) {
   } else {
     binding.mesh = std::get<Mesh>(std::move(rest));
     binding.quality = inspect(binding.mesh);
+    binding.faults = mesh_faults(binding.mesh, binding.quality);
   }
-  if (const std::vector<Index>& flat = binding.quality.degenerate_cells; !flat.empty() && !binding.by_vertices)
-    raise("{}: {} of {} cells have no volume, the first is cell {} ({})", settings.rest.string(), flat.size(),
-          binding.mesh.num_cells(), flat[0], element_name(binding.mesh, flat[0]));
+  // Baselines ask nothing of cells.
+  if (!binding.by_vertices) settings.limits.check(settings.rest, binding.faults);
   binding.surface = read_points(settings.points);
   binding.points = in_dimension(binding.surface.points, binding.gdim(), settings.points.string());
   Fingerprint print;
@@ -205,23 +207,70 @@ void locate(const BindSettings& settings, Binding& binding) {
     binding.embedding =
         binding.grid ? embed(*binding.grid, binding.points, options) : embed(binding.mesh, binding.points, options);
   }
+  settings.limits.check(settings.points, point_faults(binding.embedding));
 }
 
 void reconstruct(const BindSettings& settings, Binding& binding) {
-  if (binding.reconstruction || binding.by_vertices) return;
-  const MadeReconstructor made = made_reconstructor(settings);
-  const VertexGradientReconstructor& reconstructor = *made.reconstructor;
-  if (binding.grid)
-    binding.reconstruction =
-        reconstructor.reconstruct_on_grid(*binding.grid, active_vertices(*binding.grid, binding.embedding));
-  else if (binding.on_surface())
-    binding.reconstruction = surface_gradients(reconstructor, binding.mesh, active_vertices(binding.feet.feet));
-  else
-    binding.reconstruction =
-        reconstructor.reconstruct(CellGradients(binding.mesh), active_vertices(binding.mesh, binding.embedding));
+  if (binding.by_vertices) return;
+  if (!binding.reconstruction) {
+    const MadeReconstructor made = made_reconstructor(settings);
+    const VertexGradientReconstructor& reconstructor = *made.reconstructor;
+    if (binding.grid)
+      binding.reconstruction =
+          reconstructor.reconstruct_on_grid(*binding.grid, active_vertices(*binding.grid, binding.embedding));
+    else if (binding.on_surface())
+      binding.reconstruction = surface_gradients(reconstructor, binding.mesh, active_vertices(binding.feet.feet));
+    else
+      binding.reconstruction =
+          reconstructor.reconstruct(CellGradients(binding.mesh), active_vertices(binding.mesh, binding.embedding));
+  }
+  settings.limits.check(settings.rest, gradient_faults(binding.reconstruction->stencils));
 }
 
-void save_binding(const BindOptions& options, const std::filesystem::path& out, bool quiet) {
+nlohmann::ordered_json rule_facts(const BindSettings& settings) {
+  const ConfiguredInterpolant& interpolant = settings.interpolant;
+  nlohmann::ordered_json facts = {{"interpolant", interpolant.name},
+                                  {"interpolant_options", json::object()},
+                                  {"alpha", nullptr},
+                                  {"reconstructor", nullptr},
+                                  {"options", json::object()}};
+  if (settings.is_baseline())
+    facts["interpolant_options"] = json::parse(interpolant.options);
+  else if (interpolant.rule.formula == Formula::blend)
+    facts["alpha"] = interpolant.rule.alpha;
+  if (interpolant.needs_gradients()) {
+    facts["reconstructor"] = settings.reconstructor;
+    facts["options"] = json::parse(settings.reconstructor_options);
+  }
+  return facts;
+}
+
+nlohmann::ordered_json diagnosis(const BindSettings& settings, const Binding& binding) {
+  nlohmann::ordered_json result;
+  if (!binding.grid) {
+    result["mesh"] = to_json(binding.faults);
+    result["mesh"]["min_quality"] = binding.quality.min_quality;
+  }
+  if (binding.reconstruction) {
+    result["vertex_rules"] = rule_counts(binding.reconstruction->stencils);
+    result["vertices_by_rule"] = vertices_by_rule(binding.reconstruction->stencils);
+  }
+  if (binding.by_vertices) return result;
+  double farthest = 0;
+  nlohmann::ordered_json points = nlohmann::ordered_json::array();
+  for (const OutsidePoint& outside : binding.embedding.outside) {
+    farthest = std::max(farthest, outside.distance);
+    points.push_back({{"point", outside.point}, {"distance", outside.distance}});
+  }
+  result["outside"] = {{"policy", settings.outside},
+                       {"count", binding.embedding.outside.size()},
+                       {"max_distance", farthest},
+                       {"points", points}};
+  return result;
+}
+
+void save_binding(const BindOptions& options, const std::filesystem::path& out, const std::filesystem::path& report,
+                  bool quiet) {
   if (out.extension() != ".hgb") raise("--out {}: expected a name that ends in .hgb", out.string());
   const BindSettings settings = parse_settings(options);
   Binding binding = read_inputs(settings);
@@ -234,9 +283,24 @@ void save_binding(const BindOptions& options, const std::filesystem::path& out, 
   else if (binding.on_surface())
     saved.places = binding.feet;
   write_binding(out, saved);
+  if (!report.empty()) {
+    nlohmann::ordered_json facts = {{"version", version},
+                                    {"rest", settings.rest.string()},
+                                    {"points", settings.points.string()},
+                                    {"out", out.string()}};
+    facts.update(rule_facts(settings));
+    facts["counts"] = {
+        {"points", binding.points.rows()}, {"vertices", binding.num_vertices()}, {"cells", binding.num_cells()}};
+    facts.update(diagnosis(settings, binding));
+    write_text_atomically(report, facts.dump(2) + "\n");
+  }
   if (quiet) return;
   fmt::print("{} points bound to {} written to {}\n", binding.points.rows(), settings.rest.string(), out.string());
-  if (!binding.embedding.outside.empty()) fmt::print("{} points outside the mesh\n", binding.embedding.outside.size());
+  std::vector<Fault> faults = binding.faults;
+  for (Fault& fault : point_faults(binding.embedding)) faults.push_back(std::move(fault));
+  if (binding.reconstruction)
+    for (Fault& fault : gradient_faults(binding.reconstruction->stencils)) faults.push_back(std::move(fault));
+  fmt::print("{}", fault_lines(faults));
 }
 
 }  // namespace halfgrad::app

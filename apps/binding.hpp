@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/diagnosis.hpp"
 #include "experiments/interpolant_spec.hpp"
 #include "framework/embedding.hpp"
 #include "framework/gradient_stencils.hpp"
@@ -25,6 +26,7 @@ struct BindOptions {
   /// drift.
   std::string reconstructor;
   std::optional<std::string> outside;
+  std::vector<std::string> limits;  ///< NAME=NUMBER each, besides degenerate_cells=0; see Limits
 };
 
 /// Options read and checked, before any large file is opened.
@@ -35,6 +37,7 @@ struct BindSettings {
   std::string interpolant_specification;             ///< a name, or JSON of a baseline
   std::string reconstructor, reconstructor_options;  ///< name and compact JSON object; of rules that need none too
   std::string specification;                         ///< JSON that make_reconstructor reads
+  Limits limits;
 
   /// A rule that knows vertices only.
   bool is_baseline() const { return interpolant.scattered.has_value(); }
@@ -48,9 +51,10 @@ BindSettings parse_settings(const BindOptions& options, std::string_view preferr
 
 /// What binding took and gave.
 struct Binding {
-  std::optional<Grid> grid;  ///< instead of a mesh
-  Mesh mesh;                 ///< a surface in space too
-  MeshReport quality;        ///< of a mesh
+  std::optional<Grid> grid;   ///< instead of a mesh
+  Mesh mesh;                  ///< a surface in space too
+  MeshReport quality;         ///< of a mesh
+  std::vector<Fault> faults;  ///< of a mesh
   PointSet surface;
   Points points;  ///< of the surface, in the mesh's dimension
   std::string fingerprint;
@@ -66,7 +70,7 @@ struct Binding {
   Index num_cells() const { return grid ? grid->num_cells() : mesh.num_cells(); }
 };
 
-/// Reads the rest shape and the points. Throws Error on degenerate cells.
+/// Reads the rest shape and the points. This and the next two throw Error on faults beyond the limits.
 Binding read_inputs(const BindSettings& settings);
 /// Locates the points (for a baseline: computes their weights), or takes that from the saved binding.
 void locate(const BindSettings& settings, Binding& binding);
@@ -74,7 +78,13 @@ void locate(const BindSettings& settings, Binding& binding);
 /// beyond their weights.
 void reconstruct(const BindSettings& settings, Binding& binding);
 
-/// Runs `halfgrad bind`.
-void save_binding(const BindOptions& options, const std::filesystem::path& out, bool quiet);
+/// What reports say of the interpolant and the reconstructor, null where there is none.
+nlohmann::ordered_json rule_facts(const BindSettings& settings);
+/// What reports say of a binding: faults of the mesh, the rules that served its vertices, points outside.
+nlohmann::ordered_json diagnosis(const BindSettings& settings, const Binding& binding);
+
+/// Runs `halfgrad bind`; `report` is a JSON file, or empty for none.
+void save_binding(const BindOptions& options, const std::filesystem::path& out, const std::filesystem::path& report,
+                  bool quiet);
 
 }  // namespace halfgrad::app

@@ -63,16 +63,6 @@ class SignalWatch {
   void (*terminate_)(int);
 };
 
-json vertex_rules(const GradientStencilTable& table) {
-  constexpr std::array names = {"average", "full_fit", "wider_patch", "damped", "cell_value", "none"};
-  json counts = json::object();
-  for (const StencilDiagnostics& row : table.diagnostics) {
-    json& count = counts[names[static_cast<std::size_t>(row.rule)]];
-    count = count.is_null() ? 1 : count.get<std::int64_t>() + 1;
-  }
-  return counts;
-}
-
 // Signed: behind the surface's normals is negative.
 json distance_range(const std::vector<double>& distance) {
   if (distance.empty()) return {{"least", 0.0}, {"greatest", 0.0}};
@@ -181,19 +171,8 @@ Tally run_frames(const DeformOptions& options, const BindSettings& settings, con
   return tally;
 }
 
-json outside_points(const BindSettings& settings, const Binding& binding) {
-  double farthest = 0;
-  json points = json::array();
-  for (const OutsidePoint& outside : binding.embedding.outside) {
-    farthest = std::max(farthest, outside.distance);
-    points.push_back({{"point", outside.point}, {"distance", outside.distance}});
-  }
-  return {{"policy", settings.outside}, {"count", points.size()}, {"max_distance", farthest}, {"points", points}};
-}
-
 json report_of(const DeformOptions& options, const BindSettings& settings, const Binding& binding, const Tally& tally) {
   const BindReport& bound = tally.report;
-  const MeshReport& quality = binding.quality;
   json report;
   report["counts"] = {{"frames", tally.written + tally.resumed},
                       {"resumed_frames", tally.resumed},
@@ -214,7 +193,6 @@ json report_of(const DeformOptions& options, const BindSettings& settings, const
                              {"stencil_entries", bound.num_stencil_entries}});
     report["skipped"].update(
         {{"cells", bound.num_cells - bound.num_active_cells}, {"linear_cells", tally.linear_cells}});
-    report["outside"] = outside_points(settings, binding);
   }
   report["version"] = version;
   report["rest"] = settings.rest.string();
@@ -222,19 +200,9 @@ json report_of(const DeformOptions& options, const BindSettings& settings, const
   report["points"] = settings.points.string();
   report["binding"] = settings.binding.empty() ? json(nullptr) : json(settings.binding.string());
   report["out"] = options.out.string();
-  const ConfiguredInterpolant& interpolant = settings.interpolant;
-  report["interpolant"] = interpolant.name;
-  report["interpolant_options"] = settings.is_baseline() ? json::parse(interpolant.options) : json::object();
-  report["alpha"] = !settings.is_baseline() && interpolant.rule.formula == Formula::blend ? json(interpolant.rule.alpha)
-                                                                                          : json(nullptr);
-  report["reconstructor"] = interpolant.needs_gradients() ? json(settings.reconstructor) : json(nullptr);
-  report["options"] = interpolant.needs_gradients() ? json::parse(settings.reconstructor_options) : json::object();
+  report.update(json(rule_facts(settings)));
   report["precision"] = options.precision;
-  report["mesh"] = {{"inverted_cells", quality.inverted_cells.size()},
-                    {"folded_cells", quality.folded_cells.size()},
-                    {"unused_vertices", quality.unused_vertices.size()},
-                    {"min_quality", quality.min_quality}};
-  if (binding.reconstruction) report["vertex_rules"] = vertex_rules(binding.reconstruction->stencils);
+  report.update(json(diagnosis(settings, binding)));
   if (binding.on_surface()) report["distance"] = distance_range(binding.feet.distance);
   return report;
 }

@@ -171,7 +171,12 @@ int dispatch(int argc, char** argv) {
       ->type_name("KEY=VALUE");
   check_app->footer("Example: halfgrad check configs/quickstart.json");
 
-  const auto add_bind_options = [](CLI::App* app, BindOptions& bind, const std::string& preferred) {
+  const auto add_limits = [](CLI::App* app, std::vector<std::string>& limits) {
+    app->add_option("--limit", limits, fmt::format("Refuse more of a fault than this: {}", join_names(fault_names())))
+        ->take_all()
+        ->type_name("NAME=NUMBER");
+  };
+  const auto add_bind_options = [&](CLI::App* app, BindOptions& bind, const std::string& preferred) {
     app->add_option("--rest", bind.rest,
                     "Rest mesh, grid or surface: .msh .vtk .vtu .mesh .node/.ele .vti .vtr .obj .ply");
     app->add_option("--points", bind.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy");
@@ -183,6 +188,7 @@ int dispatch(int argc, char** argv) {
         "A name, or JSON such as '{\"kriging\": {\"drift\": \"cubic\"}}'; see halfgrad list reconstructors (default: " +
             preferred + "; for dual_taylor kriging with cubic drift)");
     app->add_option("--outside", bind.outside, "Points outside the mesh: error, nearest or mark (default: error)");
+    add_limits(app, bind.limits);
   };
   DeformOptions options;
   CLI::App* deform_app = program.add_subcommand("deform", "Carry points through a sequence");
@@ -225,10 +231,11 @@ int dispatch(int argc, char** argv) {
       "float");
 
   BindOptions bind;
-  std::filesystem::path binding;
+  std::filesystem::path binding, bind_report;
   CLI::App* bind_app = program.add_subcommand("bind", "Locate points once and save that for many runs of deform");
   add_bind_options(bind_app, bind, "adaptive");
   bind_app->add_option("--out", binding, "Output: .hgb")->required();
+  bind_app->add_option("--report", bind_report, "Write faults, rules of vertices and points outside as JSON");
   bind_app->footer(
       "Example: halfgrad bind --rest cage.msh --points render.obj --out render.hgb\n"
       "         halfgrad deform --binding render.hgb --frames shot12.npy --out shot12.pc2");
@@ -267,6 +274,8 @@ int dispatch(int argc, char** argv) {
   CLI::App* info_app = program.add_subcommand("info", "Counts, bounds, quality and faults of a mesh");
   info_app->add_option("mesh", mesh, "Mesh file")->required();
   info_app->add_flag("--json", as_json, "Print JSON");
+  std::vector<std::string> info_limits;
+  add_limits(info_app, info_limits);
   info_app->footer("Example: halfgrad info cage.msh");
 
   std::string format;
@@ -305,7 +314,7 @@ int dispatch(int argc, char** argv) {
     return all_well;
   }
   if (bind_app->parsed()) {
-    save_binding(bind, binding, quiet);
+    save_binding(bind, binding, bind_report, quiet);
     return all_well;
   }
   if (export_app->parsed()) {
@@ -319,7 +328,7 @@ int dispatch(int argc, char** argv) {
     return all_well;
   }
   if (info_app->parsed()) {
-    info(mesh, as_json);
+    info(mesh, info_limits, as_json);
     return all_well;
   }
   if (describe_app->parsed()) {

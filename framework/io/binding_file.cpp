@@ -118,9 +118,17 @@ Embedding read_embedding(const TableReader& in, const BindingSizes& sizes) {
   for (PointStatus status : embedding.status)
     if (status > PointStatus::not_found) in.fail("\"status\" holds {}", static_cast<int>(status));
   const std::vector<Index> points = in.table<Index>("outside_points");
-  in.check_range("outside_points", points, 0, sizes.num_points);
-  const std::vector<double> distances = in.table<double>("outside_distances", points.size());
-  const std::vector<double> offsets = in.table<double>("outside_offsets", points.size() * gdim);
+  std::vector<Index> outside;
+  for (Index p = 0; p < sizes.num_points; ++p) {
+    const PointStatus status = embedding.status[p];
+    if ((status == PointStatus::not_found) != (embedding.cells[p] < 0))
+      in.fail("point {} has status {} and cell {}", p, static_cast<int>(status), embedding.cells[p]);
+    if (embedding.cells[p] >= 0 && !embedding.local.row(p).allFinite()) in.fail("\"local\" is not finite");
+    if (status == PointStatus::outside || status == PointStatus::not_found) outside.push_back(p);
+  }
+  if (points != outside) in.fail("\"outside_points\" are not those that \"status\" says");
+  const std::vector<double> distances = in.weights("outside_distances", points.size());
+  const std::vector<double> offsets = in.weights("outside_offsets", points.size() * gdim);
   for (std::size_t i = 0; i < points.size(); ++i)
     embedding.outside.push_back(
         {points[i], distances[i], Eigen::Map<const Eigen::VectorXd>(offsets.data() + i * gdim, embedding.gdim)});
@@ -201,7 +209,10 @@ GradientStencilTable read_table(const TableReader& in, const BindingSizes& sizes
   if (!in.table<double>("hessian_weights").empty())
     table.hessian_weights =
         in.weights("hessian_weights", static_cast<std::size_t>(num_symmetric(table.gdim)) * table.neighbors.size());
-  for (StencilRule rule : in.table<StencilRule>("rules")) {
+  const std::vector<StencilRule> rules = in.table<StencilRule>("rules");
+  if (!rules.empty() && rules.size() != table.vertices.size())
+    in.fail("\"rules\" has {} entries, expected {}", rules.size(), table.vertices.size());
+  for (StencilRule rule : rules) {
     if (rule > StencilRule::none) in.fail("\"rules\" holds {}", static_cast<int>(rule));
     table.diagnostics.emplace_back().rule = rule;
   }
@@ -241,15 +252,58 @@ Reconstruction read_reconstruction(const TableReader& in, const json& object, co
   return result;
 }
 
+std::string shown(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+// What bindings consist of: objects of few levels with texts, whole numbers and byte strings. The library's own builder
+// recurses as deep as a file tells it to, and throws on arrays of absurd lengths.
+class BindingBuilder final : public json::json_sax_t {
+ public:
+  json document;
+
+  bool start_object(std::size_t) override {
+    constexpr std::size_t most_levels = 8;
+    if (open_.size() == most_levels) return false;
+    json& object = open_.empty() ? document : (*open_.back())[key_];
+    object = json::object();
+    open_.push_back(&object);
+    return true;
+  }
+  bool end_object() override { return open_.pop_back(), true; }
+  bool key(std::string& name) override { return key_ = std::move(name), true; }
+  bool string(std::string& value) override { return put(std::move(value)); }
+  bool binary(json::binary_t& value) override { return put(std::move(value)); }
+  bool number_integer(std::int64_t value) override { return put(value); }
+  bool number_unsigned(std::uint64_t value) override { return put(value); }
+  bool number_float(double, const std::string&) override { return false; }
+  bool null() override { return false; }
+  bool boolean(bool) override { return false; }
+  bool start_array(std::size_t) override { return false; }
+  bool end_array() override { return false; }
+  bool parse_error(std::size_t, const std::string&, const json::exception&) override { return false; }
+
+ private:
+  template <class T>
+  bool put(T&& value) {
+    if (open_.empty()) return false;
+    (*open_.back())[key_] = std::forward<T>(value);
+    return true;
+  }
+
+  std::vector<json*> open_;
+  std::string key_;
+};
+
 json parse(const std::filesystem::path& path) {
   const InputFile file(path);
-  const std::string_view bytes = file.bytes();
-  json document = json::from_cbor(bytes.begin(), bytes.end(), true, false);
-  if (document.is_discarded() || !document.is_object() || !document.contains("halfgrad_binding"))
+  BindingBuilder builder;
+  const bool whole =
+      json::sax_parse(file.bytes().begin(), file.bytes().end(), &builder, json::input_format_t::cbor, true);
+  json document = std::move(builder.document);
+  if (!whole || !document.contains("halfgrad_binding"))
     raise("{}: found no binding, expected a file that halfgrad bind wrote", path.string());
   if (document["halfgrad_binding"] != format_version)
     raise("{}: found a binding of version {}, expected {}: bind again", path.string(),
-          document["halfgrad_binding"].dump(), format_version);
+          shown(document["halfgrad_binding"]), format_version);
   return document;
 }
 
@@ -275,7 +329,7 @@ SavedBinding read_binding(const std::filesystem::path& path, const BindingSizes&
   const TableReader in(path.string(), document);
   if (in.at("fingerprint") != fingerprint)
     raise("{}: the binding was made for another rest mesh or other points (fingerprint {}, found {}): bind again",
-          path.string(), in.at("fingerprint").dump(), fingerprint);
+          path.string(), shown(in.at("fingerprint")), fingerprint);
   SavedBinding binding;
   binding.fingerprint = fingerprint;
   if (!in.at("settings").is_string()) in.fail("\"settings\" is no text");

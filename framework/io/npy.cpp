@@ -203,6 +203,8 @@ Values<double> read_npy(const std::filesystem::path& path) {
   const NpyArray array = parse_npy(file);
   if (array.shape.size() != 2)
     raise("{}: found an array of shape ({}), expected #rows × #columns", path.string(), fmt::join(array.shape, ", "));
+  // An array without columns may claim any number of rows.
+  check_shape(file, array, 1, std::numeric_limits<Index>::max(), "#rows × #columns with values");
   Values<double> values(array.shape[0], array.shape[1]);
   copy_frame(array, 0, values);
   return values;
