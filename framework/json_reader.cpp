@@ -63,7 +63,7 @@ NamedOptions read_named_options(const json& specification, const std::string& po
     choice.options = &specification.begin().value();
   } else {
     raise("{}: found {}, expected one {}: its name, or {{\"name\": {{options}}}}",
-          pointer.empty() ? kind : std::string_view(pointer), shown(specification), kind);
+          pointer.empty() ? kind : std::string_view(pointer), described(specification), kind);
   }
   if (std::find(known.begin(), known.end(), choice.name) == known.end())
     raise("{}: no {} \"{}\"; known: {}", pointer.empty() ? kind : std::string_view(pointer), kind, choice.name,
