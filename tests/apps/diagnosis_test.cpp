@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/run_program.hpp"
+#include "framework/error.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
 #include "framework/io/npy.hpp"

@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "apps/run_program.hpp"
+#include "framework/error.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
 #include "framework/io/vtk_output.hpp"
