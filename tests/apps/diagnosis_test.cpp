@@ -1,4 +1,5 @@
 // What info, bind and deform say of faults in their input, and what they refuse.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

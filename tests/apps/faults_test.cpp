@@ -1,11 +1,13 @@
 // What goes wrong around the program: disks that are full, folders that cannot be written, frames that are missing or
 // of another mesh. It says what and where, and leaves what is whole.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 

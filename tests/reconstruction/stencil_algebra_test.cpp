@@ -3,15 +3,20 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "framework/interpolant.hpp"
 #include "reconstruction/registry.hpp"
+#include "support/message_of.hpp"
 #include "support/test_meshes.hpp"
 
 namespace halfgrad {
 namespace {
+
+// The same cases in every run, unless the environment asks for others.
+[[maybe_unused]] const int seeded = ::setenv("RC_PARAMS", "seed=20", 0);
 
 // Sums and differences of these are exact in double: what must be equal to the bit can be compared so.
 rc::Gen<double> dyadic(int bound = 64) {
@@ -24,16 +29,20 @@ Values<double> random_values(Index rows, int columns) {
   return values;
 }
 
+std::vector<Index> shuffled(std::vector<Index> numbers) {
+  for (std::size_t i = 1; i < numbers.size(); ++i)
+    std::swap(numbers[i], numbers[*rc::gen::inRange<std::size_t>(0, i + 1)]);
+  return numbers;
+}
+
 // Rows of any neighbours and weights, whatever they mean.
 GradientStencilTable random_table(Index num_vertices, bool with_hessians) {
   GradientStencilTable table;
   table.gdim = *rc::gen::inRange(1, 4);
   std::vector<Index> order(num_vertices);
   std::iota(order.begin(), order.end(), 0);
-  table.vertices = *rc::gen::map(rc::gen::shuffle(order), [](std::vector<Index> all) {
-    all.resize((all.size() + 1) / 2);
-    return all;
-  });
+  table.vertices = shuffled(order);
+  table.vertices.resize((table.vertices.size() + 1) / 2);
   for (Index v : table.vertices) {
     const int count = *rc::gen::inRange(0, 5);
     for (int i = 0; i < count; ++i) {
@@ -49,7 +58,7 @@ GradientStencilTable random_table(Index num_vertices, bool with_hessians) {
 }
 
 std::vector<Index> some_of(const std::vector<Index>& vertices) {
-  std::vector<Index> chosen = *rc::gen::shuffle(vertices);
+  std::vector<Index> chosen = shuffled(vertices);
   chosen.resize(*rc::gen::inRange<std::size_t>(1, vertices.size() + 1));
   return chosen;
 }
@@ -112,12 +121,8 @@ RC_GTEST_PROP(StencilAlgebra, AVertexWithoutARowIsNamed, ()) {
   for (Index v = 0; v < 8; ++v)
     if (row_of(whole.stencils, v) == whole.stencils.num_rows()) missing.push_back(v);
   const Index vertex = *rc::gen::elementOf(missing);
-  try {
-    select_rows(whole, std::vector{vertex});
-    RC_FAIL("no error");
-  } catch (const Error& error) {
-    RC_ASSERT(std::string(error.what()).find(fmt::format("vertex {}:", vertex)) != std::string::npos);
-  }
+  const std::string message = message_of([&] { select_rows(whole, std::vector{vertex}); });
+  RC_ASSERT(message.find(fmt::format("vertex {}:", vertex)) != std::string::npos);
 }
 
 RC_GTEST_PROP(StencilAlgebra, RenumberedTablesGiveTheSameBits, ()) {
@@ -126,7 +131,7 @@ RC_GTEST_PROP(StencilAlgebra, RenumberedTablesGiveTheSameBits, ()) {
   const Values<double> values = random_values(num_vertices, 2);
   std::vector<Index> number(num_vertices);
   std::iota(number.begin(), number.end(), 0);
-  number = *rc::gen::shuffle(number);
+  number = shuffled(number);
   GradientStencilTable renumbered = table;
   for (Index& v : renumbered.vertices) v = number[v];
   for (Index& v : renumbered.neighbors) v = number[v];
@@ -206,7 +211,7 @@ RC_GTEST_PROP(StencilAlgebra, RowsDoNotDependOnWhichOthersAreAskedFor, ()) {
 RC_GTEST_PROP(StencilAlgebra, RenumberedMeshesHaveTheSameGradients, ()) {
   const Mesh mesh = random_mesh();
   const nlohmann::json name = random_reconstructor();
-  const std::vector<Index> number = *rc::gen::shuffle(all_vertices(mesh));
+  const std::vector<Index> number = shuffled(all_vertices(mesh));
   const Values<double> values = random_values(mesh.num_vertices(), 2);
   Points vertices = mesh.vertices();
   Values<double> moved = values;
