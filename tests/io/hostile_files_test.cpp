@@ -17,19 +17,13 @@ using testing::HasSubstr;
 
 class HostileFiles : public FileTest {};
 
-// Four points in two triangles, one of them outside and one not found, with a stencil for every vertex.
-Mesh square() {
-  Points vertices(4, 2);
-  vertices << 0, 0, 1, 0, 1, 1, 0, 1;
-  ElementBlock<Triangle> block;
-  block.cells.resize(2, 3);
-  block.cells << 0, 1, 2, 0, 2, 3;
-  return Mesh(vertices, {block});
-}
+// Of two triangles that make a square.
+constexpr BindingSizes square{.gdim = 2, .num_vertices = 4, .num_cells = 2, .num_points = 4};
 
+// Four points in it, one of them outside and one not found, with a stencil for every vertex.
 SavedBinding whole_binding() {
   SavedBinding binding{"{}", "print", {}, Reconstruction{}};
-  Embedding& embedding = binding.embedding;
+  Embedding& embedding = std::get<Embedding>(binding.places);
   embedding.gdim = 2;
   embedding.cells = {0, 1, 1, -1};
   embedding.local = Points::Constant(4, 2, 0.25);
@@ -46,24 +40,24 @@ SavedBinding whole_binding() {
 }
 
 TEST_F(HostileFiles, BindingsWhoseTablesContradictEachOtherAreRefused) {
-  const Mesh mesh = square();
   const auto message = [&](auto&& damage) {
     SavedBinding binding = whole_binding();
     damage(binding);
     write_binding(file("a.hgb"), binding);
-    return message_of([&] { read_binding(file("a.hgb"), mesh, 4, "print"); });
+    return message_of([&] { read_binding(file("a.hgb"), square, "print"); });
   };
   EXPECT_EQ(message([](SavedBinding&) {}), "no error");
   using S = SavedBinding;
-  EXPECT_THAT(message([](S& b) { b.embedding.cells[0] = -1; }), AllOf(HasSubstr("a.hgb"), HasSubstr("point 0")));
-  EXPECT_THAT(message([](S& b) { b.embedding.cells[3] = 0; }), HasSubstr("point 3"));
-  EXPECT_THAT(message([](S& b) { b.embedding.cells[1] = 2; }), HasSubstr("\"cells\" holds 2"));
-  EXPECT_THAT(message([](S& b) { b.embedding.local(1, 0) = std::nan(""); }), HasSubstr("\"local\""));
-  EXPECT_THAT(message([](S& b) { b.embedding.outside[0].distance = std::nan(""); }), HasSubstr("distances"));
-  EXPECT_THAT(message([](S& b) { b.embedding.outside[0].point = 1; }), HasSubstr("\"outside_points\""));
-  EXPECT_THAT(message([](S& b) { std::swap(b.embedding.outside[0], b.embedding.outside[1]); }),
+  const auto places = [](S& b) -> Embedding& { return std::get<Embedding>(b.places); };
+  EXPECT_THAT(message([&](S& b) { places(b).cells[0] = -1; }), AllOf(HasSubstr("a.hgb"), HasSubstr("point 0")));
+  EXPECT_THAT(message([&](S& b) { places(b).cells[3] = 0; }), HasSubstr("point 3"));
+  EXPECT_THAT(message([&](S& b) { places(b).cells[1] = 2; }), HasSubstr("\"cells\" holds 2"));
+  EXPECT_THAT(message([&](S& b) { places(b).local(1, 0) = std::nan(""); }), HasSubstr("\"local\""));
+  EXPECT_THAT(message([&](S& b) { places(b).outside[0].distance = std::nan(""); }), HasSubstr("distances"));
+  EXPECT_THAT(message([&](S& b) { places(b).outside[0].point = 1; }), HasSubstr("\"outside_points\""));
+  EXPECT_THAT(message([&](S& b) { std::swap(places(b).outside[0], places(b).outside[1]); }),
               HasSubstr("\"outside_points\""));
-  EXPECT_THAT(message([](S& b) { b.embedding.outside.pop_back(); }), HasSubstr("\"outside_points\""));
+  EXPECT_THAT(message([&](S& b) { places(b).outside.pop_back(); }), HasSubstr("\"outside_points\""));
   EXPECT_THAT(message([](S& b) { b.reconstruction->stencils.diagnostics.pop_back(); }),
               AllOf(HasSubstr("\"rules\""), HasSubstr("3 entries")));
   EXPECT_THAT(message([](S& b) { b.reconstruction->stencils.weights.pop_back(); }), HasSubstr("\"weights\""));
@@ -71,11 +65,56 @@ TEST_F(HostileFiles, BindingsWhoseTablesContradictEachOtherAreRefused) {
   EXPECT_THAT(message([](S& b) { b.reconstruction->stencils.neighbors[0] = 4; }), HasSubstr("\"neighbors\" holds 4"));
 }
 
+TEST_F(HostileFiles, FeetAndWeightsThatContradictTheirSizesAreRefused) {
+  // Every point by the three vertices of a cell.
+  SurfaceEmbedding feet;
+  feet.feet.gdim = 2;
+  feet.feet.num_vertices = 4;
+  feet.feet.offsets = {0, 3, 6, 9, 12};
+  feet.feet.vertices = {0, 1, 2, 0, 1, 2, 0, 2, 3, 0, 2, 3};
+  feet.feet.weights.assign(12, 1.0 / 3);
+  feet.feet.arms.assign(24, 0.25);
+  feet.cells = {0, 0, 1, 1};
+  feet.distance = {0, 0.5, -0.5, 0};
+  const auto of_feet = [&](auto&& damage) {
+    SurfaceEmbedding damaged = feet;
+    damage(damaged);
+    write_binding(file("a.hgb"), {"{}", "print", damaged, {}});
+    return message_of([&] { read_binding(file("a.hgb"), square, "print"); });
+  };
+  using F = SurfaceEmbedding;
+  EXPECT_EQ(of_feet([](F&) {}), "no error");
+  const SavedBinding read = read_binding(file("a.hgb"), square, "print");
+  EXPECT_EQ(std::get<F>(read.places).feet.arms, feet.feet.arms);
+  EXPECT_EQ(std::get<F>(read.places).distance, feet.distance);
+  EXPECT_THAT(of_feet([](F& f) { f.cells[1] = 2; }), HasSubstr("\"cells\" holds 2"));
+  EXPECT_THAT(of_feet([](F& f) { f.cells[1] = -1; }), HasSubstr("\"cells\" holds -1"));
+  EXPECT_THAT(of_feet([](F& f) { f.feet.vertices[0] = 4; }), HasSubstr("\"vertices\" holds 4"));
+  EXPECT_THAT(of_feet([](F& f) { f.feet.offsets[1] = 13; }), HasSubstr("\"offsets\""));
+  EXPECT_THAT(of_feet([](F& f) { f.feet.arms.pop_back(); }), HasSubstr("\"arms\""));
+  EXPECT_THAT(of_feet([](F& f) { f.feet.weights[3] = std::nan(""); }), HasSubstr("\"weights\""));
+  EXPECT_THAT(of_feet([](F& f) { f.distance.pop_back(); }), HasSubstr("\"distance\""));
+
+  using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+  const auto of_weights = [&](Weights weights) {
+    weights.makeCompressed();
+    write_binding(file("a.hgb"), {"{}", "print", weights, {}});
+    return message_of([&] { read_binding(file("a.hgb"), square, "print"); });
+  };
+  Weights weights(4, 4);
+  for (int p = 0; p < 4; ++p) weights.insert(p, p) = 1;
+  EXPECT_EQ(of_weights(weights), "no error");
+  EXPECT_EQ(std::get<Weights>(read_binding(file("a.hgb"), square, "print").places).toDense(), weights.toDense());
+  Weights wider(4, 5);
+  wider.insert(0, 4) = 1;
+  EXPECT_THAT(of_weights(wider), HasSubstr("\"vertices\" holds 4"));
+  EXPECT_THAT(of_weights(Weights(3, 4)), HasSubstr("\"offsets\""));
+}
+
 TEST_F(HostileFiles, BindingsAreWhatTheWriterWritesAndNothingElse) {
-  const Mesh mesh = square();
   const auto message = [&](const std::string& bytes) {
     file("b.hgb", bytes);
-    return message_of([&] { read_binding(file("b.hgb"), mesh, 4, "print"); });
+    return message_of([&] { read_binding(file("b.hgb"), square, "print"); });
   };
   // CBOR: an array of 2^62 entries, a hundred thousand nested arrays, as many nested objects.
   EXPECT_THAT(message("\x9b\x40" + std::string(7, '\0')), AllOf(HasSubstr("b.hgb"), HasSubstr("no binding")));
