@@ -7,6 +7,7 @@
 #include "experiments/jet.hpp"
 #include "experiments/random.hpp"
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
@@ -145,7 +146,7 @@ struct Polynomial {
 template <int D>
 std::unique_ptr<Field> make_polynomial_in(JsonReader& options, const FieldSetting& setting) {
   Polynomial<D> field;
-  field.degree = static_cast<int>(options.integer("degree", 2));
+  field.degree = small_integer(options, "degree", 2);
   if (field.degree < 0 || field.degree > 8)
     raise("{}: found {}, expected 0 to 8", options.pointer_to("degree"), field.degree);
   // Graded order: all of degree 0, then 1, …; within a degree the first axis' power falls.

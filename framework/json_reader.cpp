@@ -6,19 +6,13 @@
 #include <numeric>
 
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
 using nlohmann::json;
 
 namespace {
-
-// What a reader was found to be, short enough for a message.
-std::string shown(const json& value) {
-  std::string text = value.dump();
-  if (text.size() > 60) text = text.substr(0, 57) + "...";
-  return fmt::format("{} {}", value.type_name(), text);
-}
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -69,7 +63,7 @@ NamedOptions read_named_options(const json& specification, const std::string& po
     choice.options = &specification.begin().value();
   } else {
     raise("{}: found {}, expected one {}: its name, or {{\"name\": {{options}}}}",
-          pointer.empty() ? kind : std::string_view(pointer), shown(specification), kind);
+          pointer.empty() ? kind : std::string_view(pointer), described(specification), kind);
   }
   if (std::find(known.begin(), known.end(), choice.name) == known.end())
     raise("{}: no {} \"{}\"; known: {}", pointer.empty() ? kind : std::string_view(pointer), kind, choice.name,
@@ -80,7 +74,7 @@ NamedOptions read_named_options(const json& specification, const std::string& po
 JsonReader::JsonReader(const json& value, std::string pointer)
     : object_(&value), pointer_(std::move(pointer)), resolved_(std::make_unique<json>(json::object())) {
   if (!value.is_object())
-    raise("{}: found {}, expected an object", pointer_.empty() ? "the document" : pointer_, shown(value));
+    raise("{}: found {}, expected an object", pointer_.empty() ? "the document" : pointer_, described(value));
 }
 
 JsonReader::~JsonReader() = default;
@@ -114,7 +108,7 @@ double JsonReader::number(std::string_view key, double fallback) {
 double JsonReader::number(std::string_view key) {
   const json& value = at(key);
   if (!value.is_number() || !std::isfinite(value.get<double>()))
-    raise("{}: found {}, expected a finite number", pointer_to(key), shown(value));
+    raise("{}: found {}, expected a finite number", pointer_to(key), described(value));
   return value.get<double>();
 }
 
@@ -124,17 +118,7 @@ std::int64_t JsonReader::integer(std::string_view key, std::int64_t fallback) {
   return fallback;
 }
 
-std::int64_t JsonReader::integer(std::string_view key) {
-  const json& value = at(key);
-  if (value.is_number_integer() && !(value.is_number_unsigned() && value.get<std::uint64_t>() > INT64_MAX))
-    return value.get<std::int64_t>();
-  // 1e6 is how people write a million.
-  if (value.is_number_float()) {
-    const double number = value.get<double>();
-    if (std::abs(number) < 9e15 && number == std::floor(number)) return static_cast<std::int64_t>(number);
-  }
-  raise("{}: found {}, expected a whole number", pointer_to(key), shown(value));
-}
+std::int64_t JsonReader::integer(std::string_view key) { return whole_number(at(key), pointer_to(key)); }
 
 bool JsonReader::boolean(std::string_view key, bool fallback) {
   if (!has(key)) {
@@ -142,7 +126,7 @@ bool JsonReader::boolean(std::string_view key, bool fallback) {
     return fallback;
   }
   const json& value = at(key);
-  if (!value.is_boolean()) raise("{}: found {}, expected true or false", pointer_to(key), shown(value));
+  if (!value.is_boolean()) raise("{}: found {}, expected true or false", pointer_to(key), described(value));
   return value.get<bool>();
 }
 
@@ -154,7 +138,7 @@ std::string JsonReader::text(std::string_view key, std::string_view fallback) {
 
 std::string JsonReader::text(std::string_view key) {
   const json& value = at(key);
-  if (!value.is_string()) raise("{}: found {}, expected a string", pointer_to(key), shown(value));
+  if (!value.is_string()) raise("{}: found {}, expected a string", pointer_to(key), described(value));
   return value.get<std::string>();
 }
 

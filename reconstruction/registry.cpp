@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 #include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
 #include "reconstruction/centered_difference.hpp"
@@ -36,20 +37,20 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
       ReconstructorEntry{"knn", "the same weights over the adjacent cells and the k cells whose centroids are nearest",
                          [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
                            KnnOptions knn;
-                           knn.k = static_cast<int>(options.integer("k", knn.k));
+                           knn.k = small_integer(options, "k", knn.k);
                            knn.epsilon = options.number("epsilon", knn.epsilon);
                            return std::make_unique<Knn>(knn);
                          }},
       ReconstructorEntry{"spr", "linear fit of the cells' gradients at their centroids (Zienkiewicz and Zhu 1992)",
                          [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
                            SprOptions spr;
-                           spr.rings = static_cast<int>(options.integer("rings", spr.rings));
+                           spr.rings = small_integer(options, "rings", spr.rings);
                            return std::make_unique<Spr>(spr);
                          }},
       ReconstructorEntry{"ppr", "gradient of a quadratic fitted to the values around a vertex (Zhang and Naga 2005)",
                          [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
                            PprOptions ppr;
-                           ppr.rings = static_cast<int>(options.integer("rings", ppr.rings));
+                           ppr.rings = small_integer(options, "rings", ppr.rings);
                            return std::make_unique<Ppr>(ppr);
                          }},
       ReconstructorEntry{"kriging", "vertex stencil, exact for quadratics (or cubics), Matern prior for the rest",
