@@ -275,7 +275,6 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
         stencils.weights[to * width + d + k] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
     }
   }
-  vertices.shrink_to_fit();
 }
 
 }  // namespace
@@ -289,11 +288,38 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
   if (rule.needs_hessians() && !table.has_hessians() && table.num_rows() > 0)
     raise("dual_taylor needs vertex Hessians: use the reconstructor {{\"kriging\": {{\"drift\": \"cubic\"}}}}");
   has_gradients = true;
-  if (reconstruction->blend)
+  if (reconstruction->blend) {
     blended = select_rows(*reconstruction, vertices);
-  else
-    pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
-  report.num_stencil_entries = blended ? table.num_entries() : static_cast<Offset>(stencils.neighbors.size());
+    take_blend(number);
+  }
+  pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
+  vertices.shrink_to_fit();
+  const auto count = [](const Stencils& rows) { return static_cast<Offset>(rows.neighbors.size()); };
+  report.num_stencil_entries = count(stencils) + count(blend.averaging) + count(blend.probing);
+}
+
+template <class Scalar>
+void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
+  const AdaptiveBlend& given = *blended->blend;
+  // Rows of the probing table are vertices of the same number.
+  for (Index r = num_active; r < given.probing.num_rows(); ++r) {
+    number[given.probing.vertices[r]] = static_cast<Index>(vertices.size());
+    vertices.push_back(given.probing.vertices[r]);
+  }
+  pack_stencils(given.probing, false, given.probing.num_rows(), vertices, number, blend.probing);
+  pack_stencils(given.averaging, false, num_active, vertices, number, blend.averaging);
+  for (Offset e = 0; e < static_cast<Offset>(given.edge_rows.size()); ++e) {
+    const Eigen::Map<const Eigen::VectorXd> edge(given.edges.data() + e * gdim, gdim);
+    const double length = edge.norm();
+    blend.edges.push_back(static_cast<Scalar>(2 / length));
+    for (int a = 0; a < gdim; ++a) blend.edges.push_back(static_cast<Scalar>(edge[a] / length));
+  }
+  for (Index r = 0; r < num_active; ++r) {
+    const EdgeMetric metric = edge_metric(given, r, gdim);
+    for (const SmallMatrix* matrix : {&metric.sum, &metric.damped_inverse})
+      for (int a = 0; a < gdim; ++a)
+        for (int c = a; c < gdim; ++c) blend.metrics.push_back(static_cast<Scalar>((*matrix)(a, c)));
+  }
 }
 
 template <class Scalar>
@@ -308,10 +334,12 @@ void Interpolant<Scalar>::Binding::count_bytes() {
         },
         any);
   report.bytes += bytes(weighted.first) + bytes(weighted.nodes) + bytes(weighted.coefficients) + bytes(weighted.beta);
-  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position) + bytes(stencils.offsets) +
-                  bytes(stencils.neighbors) + bytes(stencils.weights);
+  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position);
+  for (const Stencils* rows : {&stencils, &blend.averaging, &blend.probing})
+    report.bytes += bytes(rows->offsets) + bytes(rows->neighbors) + bytes(rows->weights);
+  report.bytes += bytes(blend.edges) + bytes(blend.metrics);
   if (blended)
-    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging})
+    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging, &blended->blend->probing})
       report.bytes += bytes(table->offsets) + bytes(table->neighbors) + bytes(table->weights);
 }
 
