@@ -88,8 +88,9 @@ void pack_lines(const Scalar* positions, const Values<Scalar>& gradients, const 
 template <class Stencils, class Scalar>
 kernels::VertexStage<Scalar> vertex_stage(const Stencils& stencils, int num_weights, const std::array<Scalar, 9>& scale,
                                           const Scalar* positions, Scalar* lines) {
-  return {num_weights, stencils.offsets.data(), stencils.neighbors.data(), stencils.weights.data(), scale, positions,
-          lines};
+  return {
+      num_weights, stencils.first_group.data(), stencils.neighbors.data(), stencils.weights.data(), scale, positions,
+      lines};
 }
 
 // `out` is that of the first point of all blocks.
@@ -101,9 +102,8 @@ kernels::PointStage<Scalar> point_stage(const Runs& runs, Eigen::Index columns, 
           .nodes = runs.nodes.data()->data(),
           .rest = runs.rest.data()->data()->data(),
           .first = runs.first.data(),
-          .first_chunk = runs.first_chunk.data(),
-          .chunks = runs.chunks.data(),
           .local = runs.local.data(),
+          .edges = runs.edges.view(),
           .extrapolates = runs.extrapolates.empty() ? nullptr : runs.extrapolates.data(),
           .affine = runs.affine.data(),
           .lines = lines,
@@ -181,19 +181,17 @@ template <class Scalar>
 void Interpolant<Scalar>::Binding::plain_vertex_stage(const Values<Scalar>& values, int first_weight, int width,
                                                       Values<Scalar>& out) const {
   const Eigen::Index columns = values.cols();
-  const int stride = num_stencil_weights();
   out.resize(num_active, columns * width);
   parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
     for (std::int64_t r = begin; r < end; ++r) {
       Scalar* row = out.data() + r * columns * width;
       std::fill(row, row + columns * width, Scalar(0));
       const Scalar* own = values.data() + static_cast<Offset>(vertices[r]) * columns;
-      for (Offset e = stencils.offsets[r]; e < stencils.offsets[r + 1]; ++e) {
+      for (Offset e = stencils.begin(r); e < stencils.end(r); ++e) {
         const Scalar* other = values.data() + static_cast<Offset>(vertices[stencils.neighbors[e]]) * columns;
-        const Scalar* weight = stencils.weights.data() + e * stride + first_weight;
         for (Eigen::Index c = 0; c < columns; ++c) {
           const Scalar difference = other[c] - own[c];
-          for (int k = 0; k < width; ++k) row[c * width + k] += difference * weight[k];
+          for (int k = 0; k < width; ++k) row[c * width + k] += difference * stencils.weight(e, first_weight + k);
         }
       }
     }
@@ -230,7 +228,7 @@ void Interpolant<Scalar>::Binding::plain_point_stage(const Runs<E>& runs, Index 
       if (with_hessians) hessian[i] = hessians.data() + node * columns * sym;
     }
     for (Index p = runs.first[run]; p < runs.first[run + 1]; ++p) {
-      const NodeVector<E> weights_of_point = runs.beta(run, p);
+      const NodeVector<E> weights_of_point = runs.beta(p);
       std::array<Scalar, n> b;
       for (int i = 0; i < n; ++i) b[i] = static_cast<Scalar>(weights_of_point[i]);
       const auto coefficients = kernels::point_coefficients<Scalar, Scalar, n, d>(used, b, runs.rest[run]);
@@ -413,7 +411,7 @@ Index Interpolant<Scalar>::Binding::update(const Values<Scalar>& values, const E
     parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
       for (std::int64_t r = begin; r < end; ++r) {
         std::uint8_t any = moved[r];
-        for (Offset e = stencils.offsets[r]; e < stencils.offsets[r + 1]; ++e) any |= moved[stencils.neighbors[e]];
+        for (Offset e = stencils.begin(r); e < stencils.end(r); ++e) any |= moved[stencils.neighbors[e]];
         stale[r] = any;
       }
       for_each_chosen_range(
@@ -430,10 +428,16 @@ Index Interpolant<Scalar>::Binding::update(const Values<Scalar>& values, const E
       return std::any_of(runs.nodes[run].begin(), runs.nodes[run].end(),
                          [&](Index node) { return changed[node] != 0; });
     };
-    for_each_chosen_range(begin, end, is_stale, [&](Index first, Index last) {
+    // One range a window, from its first stale run to its last: the work that runs of a window share is done once.
+    for (; begin < end; begin += kernels::window_size) {
+      Index first = begin, last = std::min(begin + kernels::window_size, end), num_stale = 0;
+      while (first < last && !is_stale(first)) ++first;
+      while (first < last && !is_stale(last - 1)) --last;
+      if (first == last) continue;
       stage.template run<E>(first, last);
-      num_evaluated += last - first;
-    });
+      for (Index run = first; run < last; ++run) num_stale += is_stale(run);
+      num_evaluated += num_stale;
+    }
   });
   return num_evaluated;
 }
