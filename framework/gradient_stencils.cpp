@@ -93,9 +93,10 @@ class FixedBlend {
     return four;
   }
 
-  static Scalar squared_norm(const Four& four) {
-    Scalar sum = 0;
-    for (int c = 0; c < columns; ++c) sum += four[c] * four[c];
+  // In double: squares of what float holds, 1e-25 or 1e25, are beyond float's numbers.
+  static double squared_norm(const Four& four) {
+    double sum = 0;
+    for (int c = 0; c < columns; ++c) sum += static_cast<double>(four[c]) * static_cast<double>(four[c]);
     return sum;
   }
 
@@ -112,7 +113,7 @@ class FixedBlend {
   }
 
   double weight_of(const std::vector<Gradient>& sharp, const std::vector<Gradient>& averaged, std::int64_t row) const {
-    Scalar fitted = 0, smooth = 0;
+    double fitted = 0, smooth = 0;
     const Four own = value(table_.vertices[row]);
     for (Offset e = blend_.edge_offsets[row]; e < blend_.edge_offsets[row + 1]; ++e) {
       const Index other = blend_.edge_rows[e];
@@ -126,9 +127,8 @@ class FixedBlend {
         of_sharp += (sharp[row][a] + sharp[other][a]) * component;
         of_averaged += (averaged[row][a] + averaged[other][a]) * component;
       }
-      const auto scale = static_cast<Scalar>(1 / squared_length);
-      fitted += squared_norm(of_sharp) * scale;
-      smooth += squared_norm(of_averaged) * scale;
+      fitted += squared_norm(of_sharp) / squared_length;
+      smooth += squared_norm(of_averaged) / squared_length;
     }
     return sharp_weight(fitted, smooth);
   }
