@@ -19,6 +19,7 @@ struct StressReconstructor {
   bool grids_only = false;        ///< refuses what is no grid of boxes
   double accepted_sum = 0;        ///< kriging: the greatest A1 of accepted rows; else 0
   bool is_mean = false;           ///< weights of cells are not negative
+  bool blended_in = false;        ///< adaptive may take its gradients
 };
 
 /// All of the registry, kriging in its three forms.

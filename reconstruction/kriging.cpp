@@ -85,7 +85,7 @@ class KrigingRow {
     row.diagnostics.schedule_entry = static_cast<std::uint8_t>(best_entry_);
     row.diagnostics.smallest_singular_value = static_cast<float>(best_.smallest_singular_value);
     row.diagnostics.expected_error = static_cast<float>(best_.expected_error);
-    if (best_.quadratic_response > missing_modes && fall_back(vertex, row)) return;
+    if (best_.quadratic_response > missing_modes) return fall_back(vertex, row);
     write(row);
     row.diagnostics.rule =
         !accepted ? StencilRule::damped : (best_entry_ == first ? StencilRule::full_fit : StencilRule::wider_patch);
@@ -152,10 +152,11 @@ class KrigingRow {
       points_.col(static_cast<Eigen::Index>(j)) = metric_ * (cells_->vertices().row(patch_[j]) - origin).transpose();
   }
 
-  // The volume-weighted mean of the adjacent cells' gradients. False where no cell is usable.
-  bool fall_back(Index vertex, StencilRow& row) const {
+  // The volume-weighted mean of the adjacent cells' gradients. No row where no cell is usable: what a flat patch makes
+  // of the direction across it is rounding.
+  void fall_back(Index vertex, StencilRow& row) const {
     const CellWeights average = VolumeAverage().weights(*cells_, vertex);
-    if (average.cells.empty()) return false;
+    if (average.cells.empty()) return;
     compose_row(*cells_, vertex, average.cells, average.weights, row);
     const Eigen::Index gdim = cells_->gdim(), count = static_cast<Eigen::Index>(row.neighbors.size());
     const Eigen::Map<const Eigen::MatrixXd> weights(row.weights.data(), gdim, count);
@@ -163,7 +164,6 @@ class KrigingRow {
     row.diagnostics.rule = StencilRule::cell_value;
     row.diagnostics.num_points = static_cast<Index>(count);
     row.hessian_weights.assign(best_.hessian.rows() * count, 0.0);
-    return true;
   }
 
   // Back from the metric: ∂/∂X = T ∂/∂y.

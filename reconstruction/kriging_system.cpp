@@ -140,7 +140,7 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   const Eigen::Index n = points.cols(), dim = dim_, num_quadratic = num_symmetric(dim_);
   const Eigen::Index num_drift = dim + num_quadratic + (degree_ == 3 ? num_cubic(dim_) : 0);
   const Eigen::Index num_functionals = dim + (degree_ == 3 ? num_quadratic : 0);
-  memory_.resize(std::max<std::size_t>(memory_.size(), n * (n + 2 + 6 * num_drift + 3 * num_functionals)));
+  memory_.resize(std::max<std::size_t>(memory_.size(), n * (n + 2 + dim + 6 * num_drift + 3 * num_functionals)));
   Arena arena(memory_);
   const double rate = std::sqrt(7.0) / correlation_length, rate2 = rate * rate;
 
@@ -222,6 +222,15 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   cholesky.matrixL().solveInPlace<Eigen::OnTheRight>(weights);
 
   fit.gradient = weights.topRows(dim);
+  // Where points lie at very different distances the higher degrees leave their rounding, relative to their squares and
+  // cubes, in the linear constraint: it is met once more by itself.
+  const SmallSquare residual = SmallSquare::Identity(dim, dim) - fit.gradient.lazyProduct(points.transpose());
+  if (residual.cwiseAbs().maxCoeff() > 1e-13) {
+    Block linear = arena.take(dim, n);
+    linear = stages[0].inverse;
+    cholesky.matrixL().solveInPlace<Eigen::OnTheRight>(linear);
+    fit.gradient += residual.lazyProduct(linear);
+  }
   fit.hessian = weights.bottomRows(num_functionals - dim);
   fit.absolute_sum = fit.gradient.colwise().norm().sum();
   fit.quadratic_response = (fit.gradient * quadratics).norm();
