@@ -24,7 +24,7 @@ std::array<long double, max_gdim> CaseRunner::point_position(Index point) const 
   const ReferenceWeights& weights = weights_[point];
   std::array<long double, max_gdim> position = vertex_position(weights.vertices[0]);
   for (int a = 0; a < mesh_.gdim(); ++a)
-    for (int i = 1; i < weights.num_nodes; ++i) position[a] += weights.beta[i].value * weights.rest[i][a];
+    for (int i = 1; i < weights.num_nodes; ++i) position[a] += weights.beta[i].value * weights.rest[i][a].value;
   return position;
 }
 
@@ -113,9 +113,9 @@ void CaseRunner::check_located() {
       Measured found;
       long double low = 0, high = 0;
       for (int i = 0; i < weights.num_nodes; ++i) {
-        found = found + weights.beta[i] * Measured(weights.rest[i][a]);
-        low = std::min(low, weights.rest[i][a]);
-        high = std::max(high, weights.rest[i][a]);
+        found = found + weights.beta[i] * Measured(weights.rest[i][a].value);
+        low = std::min(low, weights.rest[i][a].value);
+        high = std::max(high, weights.rest[i][a].value);
       }
       long double bound =
           1e-12L * std::max(high - low, std::abs(wanted)) + steps_of_a_point * epsilon * found.magnitude;

@@ -62,9 +62,9 @@ void fill_beta(const Embedding& embedding, Index point, const OutsidePoint* outs
 
 template <int d>
 ReferenceCoefficients coefficients_in(const InterpolationRule& rule, const ReferenceWeights& weights) {
-  std::array<std::array<long double, d>, max_nodes> rest;
+  std::array<std::array<Measured, d>, max_nodes> rest;
   for (int i = 0; i < max_nodes; ++i) std::copy_n(weights.rest[i].begin(), d, rest[i].begin());
-  const auto found = kernels::point_coefficients<Measured, long double, max_nodes, d>(rule, weights.beta, rest);
+  const auto found = kernels::point_coefficients<Measured, Measured, max_nodes, d>(rule, weights.beta, rest);
   ReferenceCoefficients result;
   for (int i = 0; i < weights.num_nodes; ++i) {
     result.a[i] = found.a[i];
@@ -90,11 +90,16 @@ ReferenceWeights reference_weights(const Mesh& mesh, const Embedding& embedding,
   const Index cell = embedding.cells[point];
   with_cell(mesh, cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
     result.num_nodes = E::num_nodes;
+    double largest = 0;
+    for (int i = 0; i < E::num_nodes; ++i)
+      largest = std::max(largest, mesh.vertices().row(block.cells(row, i)).cwiseAbs().maxCoeff());
     for (int i = 0; i < E::num_nodes; ++i) {
       result.vertices[i] = block.cells(row, i);
-      for (int k = 0; k < E::dim; ++k)
-        result.rest[i][k] =
-            static_cast<long double>(mesh.vertices()(block.cells(row, i), k)) - mesh.vertices()(block.cells(row, 0), k);
+      for (int k = 0; k < E::dim; ++k) {
+        const long double from = mesh.vertices()(block.cells(row, 0), k);
+        result.rest[i][k] = Measured(mesh.vertices()(block.cells(row, i), k) - from);
+        if (!E::affine) result.rest[i][k].magnitude += 8 * largest;
+      }
     }
     fill_beta<E>(embedding, point, outside, result.beta);
   });

@@ -27,6 +27,7 @@ struct Measured {
   friend Measured operator-(const Measured& x, const Measured& y) {
     return {x.value - y.value, x.magnitude + y.magnitude};
   }
+  friend Measured operator/(const Measured& x, int y) { return {x.value / y, x.magnitude / std::abs(y)}; }
   friend Measured operator*(const Measured& x, const Measured& y) {
     return {x.value * y.value, x.magnitude * y.magnitude};
   }
@@ -37,8 +38,9 @@ struct ReferenceWeights {
   int num_nodes = 0;
   std::array<Index, max_nodes> vertices{};
   std::array<Measured, max_nodes> beta{};
-  /// X_i − X_0, exact but for their last bit; zero beyond num_nodes.
-  std::array<std::array<long double, max_gdim>, max_nodes> rest{};
+  /// X_i − X_0, zero beyond num_nodes. Cells that are no simplices count as affine where rounding of their coordinates
+  /// would make them so: eight units of their last place are part of the magnitude.
+  std::array<std::array<Measured, max_gdim>, max_nodes> rest{};
 };
 
 /// Weights of a point that has a cell.

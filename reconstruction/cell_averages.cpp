@@ -44,9 +44,23 @@ CellWeights normalised(const std::vector<UsableCell>& usable, const std::vector<
   return result;
 }
 
+// Whether a cell's centroid is not the vertex itself. Far from the origin it is, by rounding; in the limit weights by
+// inverse distance are then zero for all other cells.
+bool away_from_vertex(const UsableCell& cell) { return cell.offset.squaredNorm() > 0; }
+
+// Weights by inverse distance.
+CellWeights inverse_distance_weights(const std::vector<UsableCell>& usable) {
+  const bool all_away = std::all_of(usable.begin(), usable.end(), away_from_vertex);
+  std::vector<double> raw;
+  for (const UsableCell& cell : usable)
+    raw.push_back(all_away ? 1 / cell.offset.norm() : away_from_vertex(cell) ? 0.0 : 1.0);
+  return normalised(usable, raw);
+}
+
 // James 2020, Eq. 24–27 over any set of cells.
 CellWeights consistent_weights(const std::vector<UsableCell>& usable, double epsilon, Index vertex) {
   if (usable.empty()) return {};
+  if (!std::all_of(usable.begin(), usable.end(), away_from_vertex)) return inverse_distance_weights(usable);
   const Eigen::Index gdim = usable.front().offset.size();
   SmallMatrix normal = SmallMatrix::Zero(gdim, gdim);
   Vector sum = Vector::Zero(gdim);
@@ -76,7 +90,7 @@ CellWeights consistent_weights(const std::vector<UsableCell>& usable, double eps
   if (!(std::abs(total) > 1e-10 * magnitude)) {
     if (epsilon == 0)
       raise("chandrashekar_garg: the weights of vertex {} sum to zero with epsilon 0: use epsilon > 0", vertex);
-    for (std::size_t k = 0; k < usable.size(); ++k) raw[k] = 1 / usable[k].offset.norm();
+    return inverse_distance_weights(usable);
   }
   return normalised(usable, raw);
 }
@@ -100,10 +114,7 @@ CellWeights UnweightedAverage::weights(const CellGradients& cells, Index vertex)
 }
 
 CellWeights InverseDistance::weights(const CellGradients& cells, Index vertex) const {
-  const std::vector<UsableCell> usable = adjacent_cells(cells, vertex);
-  std::vector<double> raw;
-  for (const UsableCell& cell : usable) raw.push_back(1 / cell.offset.norm());
-  return normalised(usable, raw);
+  return inverse_distance_weights(adjacent_cells(cells, vertex));
 }
 
 CellWeights VolumeAverage::weights(const CellGradients& cells, Index vertex) const {
