@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "framework/cell_extent.hpp"
+#include "framework/refined_inverse.hpp"
 
 namespace halfgrad {
 
@@ -39,7 +40,7 @@ class InverseMap {
     determinant_ = jacobian.determinant();
     degenerate_ = is_degenerate<E>(extent, determinant_);
     if (degenerate_) return;
-    inverse_ = jacobian.inverse();
+    inverse_ = refined_inverse<E::dim>(jacobian);
     const NodeMatrix<E> reference = E::nodes();
     if constexpr (!E::affine) {
       const NodeMatrix<E> image = (reference.rowwise() - reference.row(0)) * jacobian.transpose();

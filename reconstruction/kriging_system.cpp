@@ -21,7 +21,7 @@ constexpr double correlation_length = 6;
 constexpr double quadratic_nugget = 1e-5, cubic_nugget = 1e-6;
 // Modes with smaller singular values are damped.
 constexpr double full_inverse = 2;
-constexpr int max_modes = 10;  // of the cubic stage in 3D
+constexpr int max_modes = 20;  // of the cubic stage in four dimensions
 using SmallSquare = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_modes, max_modes>;
 
 constexpr int num_cubic(int dim) { return dim * (dim + 1) * (dim + 2) / 6; }
@@ -162,7 +162,7 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   const Eigen::Index n = points.cols(), dim = dim_, num_quadratic = num_symmetric(dim_);
   const Eigen::Index num_drift = dim + num_quadratic + (degree_ == 3 ? num_cubic(dim_) : 0);
   const Eigen::Index num_functionals = dim + (degree_ == 3 ? num_quadratic : 0);
-  memory_.resize(std::max<std::size_t>(memory_.size(), n * (n + 2 + 6 * num_drift + 3 * num_functionals)));
+  memory_.resize(std::max<std::size_t>(memory_.size(), n * (n + 2 + dim + 6 * num_drift + 3 * num_functionals)));
   Arena arena(memory_);
   const double rate = std::sqrt(7.0) / correlation_length, rate2 = rate * rate;
 
@@ -243,6 +243,17 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   weights = rows_out.leftCols(n);
   cholesky.matrixL().solveInPlace<Eigen::OnTheRight>(weights);
 
+  // Where points lie at very different distances the higher degrees leave their rounding, relative to their squares and
+  // cubes, in the linear constraint: that gradients of linear functions are exact and their Hessians zero. It is met
+  // once more by itself.
+  SmallSquare residual = -weights.lazyProduct(points.transpose());
+  residual.topRows(dim) += SmallSquare::Identity(dim, dim);
+  if (residual.cwiseAbs().maxCoeff() > 1e-13) {
+    Block linear = arena.take(dim, n);
+    linear = stages[0].inverse;
+    cholesky.matrixL().solveInPlace<Eigen::OnTheRight>(linear);
+    weights += residual.lazyProduct(linear);
+  }
   fit.gradient = weights.topRows(dim);
   fit.hessian = weights.bottomRows(num_functionals - dim);
   fit.absolute_sum = fit.gradient.colwise().norm().sum();
