@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "framework/interpolant_binding.hpp"
+#include "framework/kernels/blend_stage.hpp"
 #include "framework/kernels/formulas.hpp"
 
 namespace halfgrad {
@@ -199,7 +200,6 @@ void Interpolant<Scalar>::Binding::plain_vertex_stage(const Values<Scalar>& valu
 
 template <class Scalar>
 Values<Scalar> Interpolant<Scalar>::Binding::vertex_hessians(const Values<Scalar>& values) const {
-  if (blended) return apply_hessian_stencils(blended->stencils, values).topRows(num_active);
   Values<Scalar> result;
   plain_vertex_stage(values, gdim, num_symmetric(gdim), result);
   return result;
@@ -271,8 +271,8 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
         },
         any);
 
-  // Gradients for the plain path, and where no stencils give the lines.
-  if (rule.needs_gradients() && gradients == nullptr && (any_plain || blended)) {
+  // Gradients for the plain path.
+  if (rule.needs_gradients() && gradients == nullptr && any_plain) {
     if (blended)
       workspace.gradients = blended_gradients(*blended, values);
     else
@@ -297,7 +297,9 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
       Scalar* target = reserve<Scalar>(workspace.lines, static_cast<Offset>(num_active) * 4 * (1 + num_weights));
       lines = target;
       const auto scale = line_scale<Scalar>(fast, gdim);
-      if (from_stencils) {
+      if (from_stencils && blended) {
+        blend_lines(positions, scale, workspace, target);
+      } else if (from_stencils) {
         const auto stage = vertex_stage(stencils, num_weights, scale, static_cast<const Scalar*>(positions), target);
         parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
           stage.run(static_cast<Index>(begin), static_cast<Index>(end));
@@ -328,6 +330,36 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
     weighted_point_stage(values, gradients != nullptr ? *gradients : none, hessians != nullptr ? *hessians : none, out);
   std::fill(out + static_cast<Offset>(num_served) * values.cols(),
             out + static_cast<Offset>(report.num_points) * values.cols(), std::numeric_limits<Scalar>::quiet_NaN());
+}
+
+template <class Scalar>
+void Interpolant<Scalar>::Binding::blend_lines(const Scalar* positions, const std::array<Scalar, 9>& scale,
+                                               Workspace<Scalar>& workspace, Scalar* lines) const {
+  std::array<Scalar, 9> one;
+  one.fill(1);
+  const Index num_probing = blend.num_probing();
+  const Offset length = 4 * (1 + gdim);
+  Scalar* const averaging = reserve<Scalar>(workspace.averaging, num_active * length);
+  Scalar* const probing = reserve<Scalar>(workspace.probing, num_probing * length);
+  const auto run = [](Index num_rows, const auto& stage) {
+    parallel_for(num_rows, vertex_grain(num_rows), [&](std::int64_t begin, std::int64_t end) {
+      stage.run(static_cast<Index>(begin), static_cast<Index>(end));
+    });
+  };
+  run(num_active, vertex_stage(stencils, gdim, one, positions, lines));
+  run(num_active, vertex_stage(blend.averaging, gdim, one, positions, averaging));
+  run(num_probing, vertex_stage(blend.probing, gdim, one, positions, probing));
+  const AdaptiveBlend& given = *blended->blend;
+  run(num_active, kernels::BlendStage<Scalar>{.dim = gdim,
+                                              .edge_offsets = given.edge_offsets.data(),
+                                              .edge_rows = given.edge_rows.data(),
+                                              .edges = blend.edges.data(),
+                                              .metrics = blend.metrics.data(),
+                                              .averaging = averaging,
+                                              .probing = probing,
+                                              .prediction_share = static_cast<Scalar>(given.prediction_share),
+                                              .scale = scale,
+                                              .lines = lines});
 }
 
 template <class Scalar>

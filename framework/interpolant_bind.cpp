@@ -8,17 +8,52 @@ namespace halfgrad {
 
 namespace {
 
-// Interleaves the bits of quantised coordinates: cells near in space get near numbers.
-std::uint64_t morton_code(const Vector& unit) {
-  const int gdim = static_cast<int>(unit.size());
-  const int bits = std::min(21, 63 / gdim);
-  std::uint64_t code = 0;
-  std::array<std::uint64_t, 8> coordinate{};
-  for (int k = 0; k < gdim; ++k)
-    coordinate[k] = static_cast<std::uint64_t>(std::clamp(unit[k], 0.0, 1.0) * static_cast<double>((1ull << bits) - 1));
-  for (int b = bits - 1; b >= 0; --b)
-    for (int k = 0; k < gdim; ++k) code = (code << 1) | ((coordinate[k] >> b) & 1);
-  return code;
+// Interleaves the bits of quantised coordinates, 32 in all: cells near in space get near numbers.
+class MortonCode {
+ public:
+  explicit MortonCode(const Points& vertices) : gdim_(static_cast<int>(vertices.cols())) {
+    const Eigen::RowVectorXd low = vertices.colwise().minCoeff(), high = vertices.colwise().maxCoeff();
+    const double extent = (high - low).maxCoeff();
+    low_.assign(low.begin(), low.end());
+    const double steps = static_cast<double>((std::int64_t{1} << 32 / gdim_) - 1);
+    scale_ = extent > 0 ? steps / extent : 0;
+    for (std::uint32_t byte = 0; byte < 256; ++byte)
+      for (int b = 0; b < 8; ++b) spread_[byte] |= static_cast<std::uint64_t>(byte >> b & 1) << b * gdim_;
+  }
+
+  std::uint32_t operator()(const double* position) const {
+    std::uint64_t code = 0;
+    for (int k = 0; k < gdim_; ++k) {
+      const auto step = static_cast<std::uint32_t>((position[k] - low_[k]) * scale_);
+      for (int byte = 0; 8 * byte < 32 / gdim_; ++byte)
+        code |= spread_[step >> 8 * byte & 255] << (8 * byte * gdim_ + gdim_ - 1 - k);
+    }
+    return static_cast<std::uint32_t>(code);
+  }
+
+ private:
+  int gdim_;
+  std::vector<double> low_;
+  double scale_;
+  std::array<std::uint64_t, 256> spread_{};
+};
+
+struct CodedCell {
+  std::uint32_t code;
+  Index cell;
+};
+
+// Sorts by code; cells of one code keep their order.
+void sort_by_code(std::vector<CodedCell>& cells) {
+  constexpr int bits = 11, mask = (1 << bits) - 1;
+  std::vector<CodedCell> sorted(cells.size());
+  for (int shift = 0; shift < 32; shift += bits) {
+    std::array<Index, mask + 2> next{};
+    for (const CodedCell& cell : cells) ++next[(cell.code >> shift & mask) + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    for (const CodedCell& cell : cells) sorted[next[cell.code >> shift & mask]++] = cell;
+    cells.swap(sorted);
+  }
 }
 
 // The cells that hold points, sorted along a space-filling curve, and the points of each in ascending order.
@@ -32,35 +67,30 @@ CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
   std::vector<Index> count(static_cast<std::size_t>(mesh.num_cells()), 0);
   for (Index cell : embedding.cells)
     if (cell >= 0) ++count[cell];
-  struct Keyed {
-    std::uint64_t code;
-    Index cell;
-    bool operator<(const Keyed& other) const { return code != other.code ? code < other.code : cell < other.cell; }
-  };
-  const auto corner = [&](Index cell) { return Vector(mesh.vertices().row(mesh.cell_vertices(cell)[0]).transpose()); };
-  Vector low, high;
-  if (mesh.num_vertices() > 0) {
-    low = mesh.vertices().colwise().minCoeff().transpose();
-    high = mesh.vertices().colwise().maxCoeff().transpose();
+  std::vector<CodedCell> coded;
+  if (mesh.num_cells() > 0) {
+    const MortonCode code(mesh.vertices());
+    for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
+      for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
+        if (const auto cell = static_cast<Index>(first + c); count[cell] > 0)
+          coded.push_back({code(mesh.vertices().data() + block.cells(c, 0) * mesh.vertices().cols()), cell});
+    });
   }
-  const double extent = mesh.num_vertices() > 0 ? (high - low).maxCoeff() : 0;
-  const double scale = extent > 0 ? 1 / extent : 0;
-  std::vector<Keyed> keyed;
-  for (Index cell = 0; cell < mesh.num_cells(); ++cell)
-    if (count[cell] > 0) keyed.push_back({morton_code((corner(cell) - low) * scale), cell});
-  std::sort(keyed.begin(), keyed.end());
+  sort_by_code(coded);
 
   CellOrder order;
+  order.cells.reserve(coded.size());
+  order.first_point.reserve(coded.size() + 1);
   order.first_point.push_back(0);
-  std::vector<Index> next(count.size(), 0);
-  for (const Keyed& key : keyed) {
-    next[key.cell] = order.first_point.back();
-    order.cells.push_back(key.cell);
-    order.first_point.push_back(order.first_point.back() + count[key.cell]);
+  for (const CodedCell& each : coded) {
+    const Index begin = order.first_point.back();
+    order.cells.push_back(each.cell);
+    order.first_point.push_back(begin + count[each.cell]);
+    count[each.cell] = begin;  // now where the cell's next point goes
   }
   order.points.resize(static_cast<std::size_t>(order.first_point.back()));
   for (Index p = 0; p < embedding.num_points(); ++p)
-    if (embedding.cells[p] >= 0) order.points[next[embedding.cells[p]]++] = p;
+    if (embedding.cells[p] >= 0) order.points[count[embedding.cells[p]]++] = p;
   return order;
 }
 
@@ -157,6 +187,7 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
   if (!outside_row.empty() && !E::affine) runs.offset.assign(num_points, -1);
+  const Index* last_point = order.points.data() + order.points.size() - 1;
   parallel_for(static_cast<std::int64_t>(num_runs), 4096, [&](std::int64_t begin, std::int64_t end) {
     for (auto r = static_cast<Index>(begin); r < end; ++r) {
       const Index cell = order.cells[members[r]];
@@ -173,6 +204,8 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
             has_affine_map<Scalar, E>(positions.rowwise() - positions.row(0), positions.cwiseAbs().maxCoeff());
       const Index* points = order.points.data() + order.first_point[members[r]];
       for (Index p = runs.first[r]; p < runs.first[r + 1]; ++p, ++points) {
+        // Points lie anywhere in the caller's order: each would miss the cache.
+        __builtin_prefetch(embedding.local.data() + points[std::min<std::ptrdiff_t>(24, last_point - points)] * d);
         permutation[p] = *points;
         // On a simplex a point outside differs from one inside by its ξ alone; elsewhere it keeps its offset apart.
         const bool outside = !outside_row.empty() && outside_row[*points] >= 0;
@@ -228,7 +261,6 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
     }
     std::fill(stencils.neighbors.begin() + to, stencils.neighbors.begin() + stencils.end(v), v);
   }
-  vertices.shrink_to_fit();
 }
 
 }  // namespace
@@ -242,11 +274,38 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
   if (rule.needs_hessians() && !table.has_hessians() && table.num_rows() > 0)
     raise("dual_taylor needs vertex Hessians: use the reconstructor {{\"kriging\": {{\"drift\": \"cubic\"}}}}");
   has_gradients = true;
-  if (reconstruction->blend)
+  if (reconstruction->blend) {
     blended = select_rows(*reconstruction, vertices);
-  else
-    pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
-  report.num_stencil_entries = table.num_entries();
+    take_blend(number);
+  }
+  pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
+  vertices.shrink_to_fit();
+  report.num_stencil_entries += table.num_entries();
+}
+
+template <class Scalar>
+void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
+  const AdaptiveBlend& given = *blended->blend;
+  // Rows of the probing table are vertices of the same number.
+  for (Index r = num_active; r < given.probing.num_rows(); ++r) {
+    number[given.probing.vertices[r]] = static_cast<Index>(vertices.size());
+    vertices.push_back(given.probing.vertices[r]);
+  }
+  pack_stencils(given.probing, false, given.probing.num_rows(), vertices, number, blend.probing);
+  pack_stencils(given.averaging, false, num_active, vertices, number, blend.averaging);
+  report.num_stencil_entries += given.probing.num_entries() + given.averaging.num_entries();
+  for (Offset e = 0; e < static_cast<Offset>(given.edge_rows.size()); ++e) {
+    const Eigen::Map<const Eigen::VectorXd> edge(given.edges.data() + e * gdim, gdim);
+    const double length = edge.norm();
+    blend.edges.push_back(static_cast<Scalar>(2 / length));
+    for (int a = 0; a < gdim; ++a) blend.edges.push_back(static_cast<Scalar>(edge[a] / length));
+  }
+  for (Index r = 0; r < num_active; ++r) {
+    const EdgeMetric metric = edge_metric(given, r, gdim);
+    for (const SmallMatrix* matrix : {&metric.sum, &metric.damped_inverse})
+      for (int a = 0; a < gdim; ++a)
+        for (int c = a; c < gdim; ++c) blend.metrics.push_back(static_cast<Scalar>((*matrix)(a, c)));
+  }
 }
 
 template <class Scalar>
@@ -262,10 +321,12 @@ void Interpolant<Scalar>::Binding::count_bytes() {
         },
         any);
   report.bytes += bytes(weighted.first) + bytes(weighted.nodes) + bytes(weighted.coefficients) + bytes(weighted.beta);
-  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position) + bytes(stencils.first_group) +
-                  bytes(stencils.neighbors) + bytes(stencils.weights);
+  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position);
+  for (const Stencils* rows : {&stencils, &blend.averaging, &blend.probing})
+    report.bytes += bytes(rows->first_group) + bytes(rows->neighbors) + bytes(rows->weights);
+  report.bytes += bytes(blend.edges) + bytes(blend.metrics);
   if (blended)
-    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging})
+    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging, &blended->blend->probing})
       report.bytes += bytes(table->offsets) + bytes(table->neighbors) + bytes(table->weights);
 }
 

@@ -75,6 +75,15 @@ struct Interpolant<Scalar>::Binding {
     Scalar weight(Offset entry, int k) const { return weights[place(entry, k)]; }
   };
 
+  // A blend for the fast path; its main table is `stencils`. Rows of `probing` are the active vertices and those
+  // that follow them in the numbering.
+  struct Blend {
+    Stencils averaging, probing;
+    std::vector<Scalar> edges, metrics;  // kernels/blend_stage.hpp
+
+    Index num_probing() const { return static_cast<Index>(probing.first_group.size() - 1); }
+  };
+
   // Points given by their weights: what a point reads of each vertex, a | c_1 … c_d | (q_11 …), and β apart.
   struct Weighted {
     std::vector<Offset> first{0};  // [point]
@@ -96,7 +105,8 @@ struct Interpolant<Scalar>::Binding {
   std::vector<Index> position;     // its inverse; empty where the orders are the same
   bool has_gradients = false;
   Stencils stencils;
-  std::optional<Reconstruction> blended;  // instead of stencils
+  std::optional<Reconstruction> blended;  // of the plain path, where `stencils` are part of a blend
+  Blend blend;
 
   void require_values(const Values<Scalar>& values) const {
     if (values.rows() != report.num_vertices)
@@ -177,12 +187,16 @@ struct Interpolant<Scalar>::Binding {
   // The end of bind: the rows of the active vertices, and sums for the report. `number` is the binding's number of each
   // of the caller's vertices, −1 where it has none yet.
   void take_gradients(const Reconstruction* reconstruction, std::vector<Index>& number);
+  void take_blend(std::vector<Index>& number);
   void count_bytes();
 
   // Both stages into `out`, #points × #columns in sorted order. Gradients come from the stencils where null.
   void frame(const Values<Scalar>& values, const Values<Scalar>* gradients, const Values<Scalar>* hessians,
              const EvaluateOptions& options, Workspace<Scalar>& workspace, Scalar* out) const;
   void to_caller_order(const Values<Scalar>& sorted, Values<Scalar>& out) const;
+  // Lines of the active vertices under the blend; scale as in kernels::VertexStage.
+  void blend_lines(const Scalar* positions, const std::array<Scalar, 9>& scale, Workspace<Scalar>& workspace,
+                   Scalar* lines) const;
   // Whether every cell goes the fast path alone.
   bool all_fast(Eigen::Index columns, Kernel kernel) const;
   // The cells that changed since the workspace's last frame; their number.

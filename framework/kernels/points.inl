@@ -193,7 +193,8 @@ HWY_NOINLINE bool is_within_tolerance(const PointStage<T>& stage, Index run) {
   const T* line[num_nodes];
   find_lines<num_nodes, 4 * (1 + d)>(stage, run, line);
   const T* rest = stage.rest + static_cast<Offset>(run) * num_nodes * d;
-  const T longest = stage.tolerance * 2 * num_nodes / (num_nodes - 1);
+  // Relative to it, so that squares of short lengths do not vanish in float.
+  const T per_longest = 1 / (stage.tolerance * 2 * num_nodes / (num_nodes - 1));
   for (int i = 0; i < num_nodes; ++i)
     for (int j = 0; j < i; ++j) {
       T squared = 0;
@@ -201,9 +202,10 @@ HWY_NOINLINE bool is_within_tolerance(const PointStage<T>& stage, Index run) {
         T component = 0;
         for (int k = 0; k < d; ++k)
           component += (line[i][4 * (1 + k) + c] - line[j][4 * (1 + k) + c]) * (rest[j * d + k] - rest[i * d + k]);
+        component *= per_longest;
         squared += component * component;
       }
-      if (!(squared <= longest * longest)) return false;
+      if (!(squared <= 1)) return false;
     }
   return true;
 }

@@ -20,13 +20,18 @@ expect() {  # expect LINE WORD...: the words are among what completes the last w
 }
 
 source <("$program" describe bash)
-expect "halfgrad " deform run export info list check
+expect "halfgrad " deform run export info list check stress
 expect "halfgrad de" deform describe
 expect "halfgrad --th" --threads
 expect "halfgrad deform --re" --rest --reconstructor --report
 expect "halfgrad deform --rest a.msh --interpolant " linear phong hermite
 expect "halfgrad export --as st" stencils
+expect "halfgrad deform --normals " gradient smooth
+expect "halfgrad deform --normals --ta" --tangents
+expect "halfgrad bind --interpolant attr" attribute_transfer
+expect "halfgrad deform --ta" --tangents
 expect "halfgrad list re" reconstructors
+expect "halfgrad stress --element te" tetrahedron
 expect "halfgrad --quiet deform --outside n" nearest
 COMP_WORDS=(halfgrad deform --rest "")
 COMP_CWORD=3

@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include "framework/interpolant.hpp"
+#include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
 #include "support/test_meshes.hpp"
 
@@ -112,6 +113,37 @@ void expect_fast_equals_plain(double jitter = 0.2, int cells = 3) {
           [&] { EXPECT_LT(largest_difference(fast.evaluate(values), expected), tolerated<Scalar> * extent); });
     }
   }
+}
+
+// The blend's weight is a smooth function of a ratio of mismatches, which are small differences of large numbers:
+// round-off grows by the ratio of their sizes.
+template <Element E, class Scalar>
+void expect_blend_equals_plain() {
+  const Mesh mesh = test::lattice<E>(3, 0.2, 5);
+  const Embedding embedding = mixed_points<E>(mesh);
+  const Reconstruction reconstruction = Adaptive().reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+  const Points waves = (3 * mesh.vertices() * random_values(E::dim, 3, 6)).array().sin();
+  for (Eigen::Index columns = 1; columns <= 3; ++columns) {
+    const Values<double> values = waves.leftCols(columns).cast<Scalar>().template cast<double>();
+    for (const char* rule : {"phong", "hermite"}) {
+      SCOPED_TRACE(fmt::format("{} with {} columns", rule, columns));
+      const Interpolant<Scalar> fast(mesh, embedding, named_rule(rule), &reconstruction);
+      const Values<double> expected = Interpolant<double>(mesh, embedding, named_rule(rule), &reconstruction)
+                                          .evaluate(values, {.kernel = Kernel::plain});
+      on_every_target([&] {
+        EXPECT_LT(largest_difference(fast.evaluate(values.template cast<Scalar>()), expected), 30 * tolerated<Scalar>);
+      });
+    }
+  }
+}
+
+TEST(CellPolynomial, BlendEqualsThePlainFormulas) {
+  expect_blend_equals_plain<Segment, float>();
+  expect_blend_equals_plain<Segment, double>();
+  expect_blend_equals_plain<Triangle, float>();
+  expect_blend_equals_plain<Triangle, double>();
+  expect_blend_equals_plain<Tetrahedron, float>();
+  expect_blend_equals_plain<Tetrahedron, double>();
 }
 
 TEST(CellPolynomial, EqualsThePlainFormulasOnSegments) {
