@@ -1,4 +1,4 @@
-// What carries points, whatever the rest shape that they are bound to.
+// What carries points, whatever they are bound to.
 #pragma once
 
 #include <functional>
@@ -8,13 +8,14 @@
 
 namespace halfgrad::app {
 
-/// An interpolant of a mesh, of a grid or of a surface, as functions of the vertices' positions or other data.
+/// An interpolant of a mesh, of a grid or of a surface, or a baseline, as functions of the vertices' positions or other
+/// data. Baselines have no gradients, and no cells that could be linear.
 template <class Scalar>
 struct Carrier {
   BindReport report;
   int gdim = 0;
   std::function<void(const Values<Scalar>& positions, Values<Scalar>& out, const EvaluateOptions&)> evaluate;
-  std::function<Values<Scalar>(const Values<Scalar>& values)> evaluate_field;
+  std::function<void(const Values<Scalar>& values, Values<Scalar>& out)> evaluate_field;
   std::function<Values<Scalar>(const Values<Scalar>&positions)> gradient, smooth_gradient;
   std::function<Index(const Values<Scalar>& positions, const EvaluateOptions&)> num_linear_cells;
 };

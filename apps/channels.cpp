@@ -1,166 +1,168 @@
 #include "apps/channels.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 #include <algorithm>
 
 #include "framework/error.hpp"
-#include "framework/io/field_source.hpp"
+#include "framework/surface_directions.hpp"
 
 namespace halfgrad::app {
 
-namespace {
-
-// Area-weighted normals at the points of a surface, #points × 3; zero where a point has no face.
-Points surface_normals(const PointSet& surface) {
-  Points normals = Points::Zero(surface.points.rows(), 3);
-  for (Index f = 0; f < surface.faces.num_rows(); ++f) {
-    const std::span<const Index> face = surface.faces[f];
-    Eigen::RowVector3d area = Eigen::RowVector3d::Zero();
-    for (std::size_t i = 1; i + 1 < face.size(); ++i) {
-      const Eigen::RowVector3d a = surface.points.row(face[i]) - surface.points.row(face[0]);
-      const Eigen::RowVector3d b = surface.points.row(face[i + 1]) - surface.points.row(face[0]);
-      area += a.cross(b);
-    }
-    for (Index v : face) normals.row(v) += area;
-  }
-  for (Eigen::Index p = 0; p < normals.rows(); ++p)
-    if (const double length = normals.row(p).norm(); length > 0) normals.row(p) /= length;
-  return normals;
-}
-
-// n ∝ cof(F) N, which is F⁻ᵀN up to a factor and needs no inverse; gradients are #points × 9.
-Values<double> carried_normals(const Values<double>& gradients, const Points& normals) {
-  Values<double> result(normals.rows(), 3);
-  for (Eigen::Index p = 0; p < normals.rows(); ++p) {
-    const auto F = gradients.row(p);
-    const Eigen::Vector3d r0(F[0], F[1], F[2]), r1(F[3], F[4], F[5]), r2(F[6], F[7], F[8]);
-    const Eigen::Vector3d N = normals.row(p).transpose();
-    Eigen::Vector3d n(r1.cross(r2).dot(N), r2.cross(r0).dot(N), r0.cross(r1).dot(N));
-    if (const double length = n.norm(); length > 0) n /= length;
-    result.row(p) = n.transpose();
-  }
-  return result;
-}
-
-// Singular values of F, greatest first: #points × gdim from #points × (#columns · gdim).
-Values<double> principal_stretches(const Values<double>& gradients, int gdim) {
-  const Eigen::Index columns = gradients.cols() / gdim;
-  Values<double> result(gradients.rows(), gdim);
-  for (Eigen::Index p = 0; p < gradients.rows(); ++p) {
-    const Eigen::Map<const Values<double>> F(gradients.row(p).data(), columns, gdim);
-    const Eigen::MatrixXd right = F.transpose() * F;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(right, Eigen::EigenvaluesOnly);
-    result.row(p) = solver.eigenvalues().reverse().cwiseMax(0).cwiseSqrt().transpose();
-  }
-  return result;
-}
-
-}  // namespace
-
-struct Channels::Channel {
-  enum class Kind { gradient, stretch, normals, smooth_normals, field };
+template <class Scalar>
+struct Channels<Scalar>::Channel {
   std::string name;
   Kind kind;
   std::unique_ptr<FieldSource> field;
   std::unique_ptr<FrameSink> sink;  // none where the points' own file holds arrays
+  Values<double> read;              // of a field
+  Values<Scalar> values, result;
 };
 
-Channels::Channels(const DeformOptions& options, const Binding& binding, const FrameSource& frames,
-                   const FrameSinkOptions& sink_options) {
-  using Kind = Channel::Kind;
-  const auto add = [&](std::string name, Kind kind, std::unique_ptr<FieldSource> field = nullptr) {
-    for (const auto& channel : channels_)
-      if (channel->name == name) raise("\"{}\" would be written twice: name the field otherwise", name);
-    channels_.push_back(std::make_unique<Channel>(std::move(name), kind, std::move(field)));
-  };
+template <class Scalar>
+void Channels<Scalar>::add(std::string name, Kind kind, std::unique_ptr<FieldSource> field) {
+  for (const Channel& channel : channels_)
+    if (channel.name == name) raise("\"{}\" would be written twice: name the field otherwise", name);
+  Channel& channel = channels_.emplace_back();
+  channel.name = std::move(name);
+  channel.kind = kind;
+  channel.field = std::move(field);
+}
+
+template <class Scalar>
+void Channels<Scalar>::add_directions(const DeformOptions& options, const Binding& binding, const FrameSource& frames) {
+  const PointSet& surface = binding.surface;
+  const char* option = options.normals ? "--normals" : "--tangents";
+  const std::string kind = options.normals.value_or("gradient");
+  if (kind != "gradient" && kind != "smooth") raise("--normals {}: expected gradient or smooth", kind);
+  smooth_ = kind == "smooth";
+  if (binding.gdim() != 3 || frames.num_columns() != 3)
+    raise("{}: needs a mesh and frames in three dimensions", option);
+  if (surface.faces.num_rows() == 0)
+    raise("{}: the points of {} have no faces; give them as a surface, .obj .ply .stl .vtk .vtp or .vtu", option,
+          options.bind.points.string());
+  normals_ = point_normals(surface.points, surface.faces);
+  add("normals", Kind::normals);
+  if (!options.tangents) return;
+
+  Points from_uv;
+  if (surface.corner_uv.rows() > 0)
+    from_uv = point_tangents(surface.points, surface.faces, surface.corner_uv, normals_);
+  constexpr std::array<std::string_view, 1> names = {"tangents"};
+  if (const PointArray* own = find_array_like(surface.arrays, names)) {
+    if (own->values.cols() != 3 && own->values.cols() != 4)
+      raise("{}: \"{}\" has {} columns, expected 3, or 4 with the handedness", options.bind.points.string(), own->name,
+            own->values.cols());
+    tangents_ = orthonormal_tangents(own->values, normals_, from_uv);
+    tangents_from_ = own->name;
+  } else if (from_uv.rows() > 0) {
+    tangents_ = std::move(from_uv);
+  } else {
+    raise(
+        "--tangents: {} has neither tangents nor texture coordinates; expected \"vt\" in an .obj, s and t (or u and v) "
+        "in a .ply, point data \"tangents\" or \"uv\" in a .vtp or .vtu",
+        options.bind.points.string());
+  }
+  add("tangents", Kind::tangents);
+}
+
+template <class Scalar>
+Channels<Scalar>::Channels(const DeformOptions& options, const Binding& binding, const FrameSource& frames,
+                           const FrameSinkOptions& sink_options) {
   if (options.gradients) add("gradients", Kind::gradient);
   if (options.stretch) add("stretch", Kind::stretch);
-  if (options.normals) {
-    if (*options.normals != "gradient" && *options.normals != "smooth")
-      raise("--normals {}: expected gradient or smooth", *options.normals);
-    if (binding.gdim() != 3 || frames.num_columns() != 3)
-      raise("--normals: needs a mesh and frames in three dimensions");
-    if (binding.surface.faces.num_rows() == 0) raise("--normals: the points have no faces");
-    normals_ = surface_normals(binding.surface);
-    add("normals", *options.normals == "smooth" ? Kind::smooth_normals : Kind::normals);
-  }
+  if (options.normals || options.tangents) add_directions(options, binding, frames);
   for (const std::string& spec : options.fields) {
     auto field = std::make_unique<FieldSource>(spec, options.bind.rest, frames);
     const std::string name = field->name();
     add(name, Kind::field, std::move(field));
   }
   if (options.out.extension() == ".pvd") {
-    // What the surface came with goes through unchanged, unless a computed array bears its name.
+    // What the surface came with goes through unchanged, unless a computed array takes its place.
     for (const PointArray& array : binding.surface.arrays)
-      if (std::ranges::none_of(channels_, [&](const auto& channel) { return channel->name == array.name; }))
-        constant_.push_back(array);
+      if (array.name != tangents_from_ &&
+          std::ranges::none_of(channels_, [&](const Channel& channel) { return channel.name == array.name; }))
+        arrays_.push_back(array);
+    for (const Channel& channel : channels_) arrays_.push_back({channel.name, {}});
     return;
   }
-  for (const auto& channel : channels_)
-    channel->sink = create_frames(
-        options.out.parent_path() / (options.out.stem().string() + "." + channel->name + ".npy"), {}, sink_options);
-}
-
-Channels::~Channels() = default;
-
-Index Channels::num_resumable(Index most) const {
-  for (const auto& channel : channels_)
-    if (channel->sink) most = std::min(most, channel->sink->num_resumable());
-  return most;
-}
-
-void Channels::resume(Index num_frames) {
-  for (const auto& channel : channels_)
-    if (channel->sink) channel->sink->resume(num_frames);
+  for (Channel& channel : channels_)
+    channel.sink = create_frames(
+        options.out.parent_path() / (options.out.stem().string() + "." + channel.name + ".npy"), {}, sink_options);
 }
 
 template <class Scalar>
-std::vector<PointArray> Channels::carry(const Carrier<Scalar>& carrier, const Values<Scalar>& positions, Index frame) {
-  using Kind = Channel::Kind;
-  std::vector<PointArray> arrays = constant_;
-  Values<Scalar> gradients, smooth;
-  const auto exact = [&]() -> const Values<Scalar>& {
-    if (gradients.size() == 0) gradients = carrier.gradient(positions);
-    return gradients;
-  };
-  for (const auto& channel : channels_) {
-    Values<Scalar> result;
-    switch (channel->kind) {
+Channels<Scalar>::~Channels() = default;
+
+template <class Scalar>
+Index Channels<Scalar>::num_resumable(Index most) const {
+  for (const Channel& channel : channels_)
+    if (channel.sink) most = std::min(most, channel.sink->num_resumable());
+  return most;
+}
+
+template <class Scalar>
+void Channels<Scalar>::resume(Index num_frames) {
+  for (Channel& channel : channels_)
+    if (channel.sink) channel.sink->resume(num_frames);
+}
+
+template <class Scalar>
+const Values<Scalar>& Channels<Scalar>::exact_gradient(const Carrier<Scalar>& carrier,
+                                                       const Values<Scalar>& positions) {
+  if (!exact_is_known_) exact_gradient_ = carrier.gradient(positions);
+  exact_is_known_ = true;
+  return exact_gradient_;
+}
+
+template <class Scalar>
+const Values<Scalar>& Channels<Scalar>::directing_gradient(const Carrier<Scalar>& carrier,
+                                                           const Values<Scalar>& positions) {
+  if (!smooth_) return exact_gradient(carrier, positions);
+  if (!smooth_is_known_) smooth_gradient_ = carrier.smooth_gradient(positions);
+  smooth_is_known_ = true;
+  return smooth_gradient_;
+}
+
+template <class Scalar>
+std::span<const PointArray> Channels<Scalar>::carry(const Carrier<Scalar>& carrier, const Values<Scalar>& positions,
+                                                    Index frame) {
+  exact_is_known_ = smooth_is_known_ = false;
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    Channel& channel = channels_[c];
+    const Values<Scalar>* result = &channel.result;
+    switch (channel.kind) {
       case Kind::gradient:
-        result = exact();
+        result = &exact_gradient(carrier, positions);
         break;
       case Kind::stretch:
-        result = principal_stretches(exact().template cast<double>(), carrier.gdim).template cast<Scalar>();
+        principal_stretches(exact_gradient(carrier, positions), carrier.gdim, channel.result);
         break;
       case Kind::normals:
-        result = carried_normals(exact().template cast<double>(), normals_).template cast<Scalar>();
+        carry_normals(directing_gradient(carrier, positions), normals_, channel.result);
         break;
-      case Kind::smooth_normals:
-        smooth = carrier.smooth_gradient(positions);
-        result = carried_normals(smooth.template cast<double>(), normals_).template cast<Scalar>();
+      case Kind::tangents:
+        carry_tangents(directing_gradient(carrier, positions), tangents_, channel.result);
         break;
-      case Kind::field: {
-        Values<double> values;
-        channel->field->read(frame, values);
-        result = carrier.evaluate_field(values.template cast<Scalar>());
+      case Kind::field:
+        channel.field->read(frame, channel.read);
+        channel.values = channel.read.template cast<Scalar>();
+        carrier.evaluate_field(channel.values, channel.result);
         break;
-      }
     }
-    if (channel->sink)
-      channel->sink->write(result);
+    if (channel.sink)
+      channel.sink->write(*result);
     else
-      arrays.push_back({channel->name, result.template cast<double>()});
+      arrays_[arrays_.size() - channels_.size() + c].values = result->template cast<double>();
   }
-  return arrays;
+  return arrays_;
 }
 
-template std::vector<PointArray> Channels::carry(const Carrier<float>&, const Values<float>&, Index);
-template std::vector<PointArray> Channels::carry(const Carrier<double>&, const Values<double>&, Index);
-
-void Channels::finish() {
-  for (const auto& channel : channels_)
-    if (channel->sink) channel->sink->finish();
+template <class Scalar>
+void Channels<Scalar>::finish() {
+  for (Channel& channel : channels_)
+    if (channel.sink) channel.sink->finish();
 }
+
+template class Channels<float>;
+template class Channels<double>;
 
 }  // namespace halfgrad::app

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -62,16 +63,6 @@ class SignalWatch {
   void (*terminate_)(int);
 };
 
-json vertex_rules(const GradientStencilTable& table) {
-  constexpr std::array names = {"average", "full_fit", "wider_patch", "damped", "cell_value", "none"};
-  json counts = json::object();
-  for (const StencilDiagnostics& row : table.diagnostics) {
-    json& count = counts[names[static_cast<std::size_t>(row.rule)]];
-    count = count.is_null() ? 1 : count.get<std::int64_t>() + 1;
-  }
-  return counts;
-}
-
 // Signed: behind the surface's normals is negative.
 json distance_range(const std::vector<double>& distance) {
   if (distance.empty()) return {{"least", 0.0}, {"greatest", 0.0}};
@@ -100,13 +91,14 @@ std::string run_name(const DeformOptions& options, const BindSettings& settings,
   Fingerprint print;
   print.add(version).add(settings.to_json()).add(binding.fingerprint).add(options.frames).add(options.precision);
   print.add(fmt::format("{} {} {}", options.tolerance, range.first, range.step));
-  print.add(fmt::format("{} {} {}", options.gradients, options.stretch, options.normals.value_or("")));
+  print.add(
+      fmt::format("{} {} {} {}", options.gradients, options.stretch, options.normals.value_or(""), options.tangents));
   for (const std::string& field : options.fields) print.add(field);
   return print.text();
 }
 
-// How many of the first `most` frames come from files older than the interrupted run. Times of files advance in ticks, so
-// one of the same tick may be newer.
+// How many of the first `most` frames come from files older than the interrupted run. Times of files advance in ticks,
+// so one of the same tick may be newer.
 Index num_unchanged(const FrameSource& source, const FrameRange& range, const std::filesystem::path& mark, Index most) {
   std::error_code absent;
   const auto begun = std::filesystem::last_write_time(mark, absent);
@@ -125,13 +117,13 @@ struct Tally {
 template <class Scalar>
 Tally run_frames(const DeformOptions& options, const BindSettings& settings, const Binding& binding,
                  FrameSource& source, const FrameRange& range, Stopwatch& watch) {
-  const Carrier<Scalar> carrier = make_carrier<Scalar>(binding, settings.rule);
+  const Carrier<Scalar> carrier = make_carrier<Scalar>(binding, settings.interpolant.rule);
   watch.lap("bind");
 
   const FrameSinkOptions sink_options{range.first, range.step, run_name(options, settings, binding, range),
                                       options.resume ? Unfinished::resume : Unfinished::discard};
   const std::unique_ptr<FrameSink> sink = create_frames(options.out, binding.surface, sink_options);
-  Channels channels(options, binding, source, sink_options);
+  Channels<Scalar> channels(options, binding, source, sink_options);
 
   Tally tally;
   tally.report = carrier.report;
@@ -156,7 +148,7 @@ Tally run_frames(const DeformOptions& options, const BindSettings& settings, con
       watch.lap("evaluate");
       if (options.tolerance > 0 && !options.report.empty())
         tally.linear_cells += carrier.num_linear_cells(values, {.tolerance = options.tolerance});
-      const std::vector<PointArray> arrays = channels.carry(carrier, values, range.frame(i));
+      const std::span<const PointArray> arrays = channels.carry(carrier, values, range.frame(i));
       watch.lap("arrays");
       sink->write(out, arrays);
       watch.lap("write");
@@ -181,51 +173,37 @@ Tally run_frames(const DeformOptions& options, const BindSettings& settings, con
 
 json report_of(const DeformOptions& options, const BindSettings& settings, const Binding& binding, const Tally& tally) {
   const BindReport& bound = tally.report;
-  const MeshReport& quality = binding.quality;
   json report;
   report["counts"] = {{"frames", tally.written + tally.resumed},
                       {"resumed_frames", tally.resumed},
                       {"points", bound.num_points},
-                      {"inside", bound.num_inside},
-                      {"on_boundary", bound.num_boundary},
-                      {"outside", bound.num_outside},
-                      {"not_found", bound.num_not_found},
                       {"vertices", bound.num_vertices},
                       {"active_vertices", bound.num_active_vertices},
                       {"cells", bound.num_cells},
-                      {"active_cells", bound.num_active_cells},
-                      {"stencil_entries", bound.num_stencil_entries},
                       {"binding_bytes", bound.bytes}};
-  report["skipped"] = {{"cells", bound.num_cells - bound.num_active_cells},
-                       {"vertices", bound.num_vertices - bound.num_active_vertices},
-                       {"linear_cells", tally.linear_cells}};
+  report["skipped"] = {{"vertices", bound.num_vertices - bound.num_active_vertices}};
+  if (settings.is_baseline()) {
+    report["counts"]["weights"] = binding.transfer->matrix().nonZeros();
+  } else {
+    report["counts"].update({{"inside", bound.num_inside},
+                             {"on_boundary", bound.num_boundary},
+                             {"outside", bound.num_outside},
+                             {"not_found", bound.num_not_found},
+                             {"active_cells", bound.num_active_cells},
+                             {"stencil_entries", bound.num_stencil_entries}});
+    report["skipped"].update(
+        {{"cells", bound.num_cells - bound.num_active_cells}, {"linear_cells", tally.linear_cells}});
+  }
   report["version"] = version;
   report["rest"] = settings.rest.string();
   report["frames"] = options.frames;
   report["points"] = settings.points.string();
   report["binding"] = settings.binding.empty() ? json(nullptr) : json(settings.binding.string());
   report["out"] = options.out.string();
-  report["interpolant"] = settings.interpolant;
-  report["alpha"] = settings.rule.formula == Formula::blend ? json(settings.rule.alpha) : json(nullptr);
-  report["reconstructor"] = settings.rule.needs_gradients() ? json(settings.reconstructor) : json(nullptr);
-  report["options"] = json::parse(settings.reconstructor_options);
+  report.update(json(rule_facts(settings)));
   report["precision"] = options.precision;
-  report["mesh"] = {{"inverted_cells", quality.inverted_cells.size()},
-                    {"folded_cells", quality.folded_cells.size()},
-                    {"unused_vertices", quality.unused_vertices.size()},
-                    {"min_quality", quality.min_quality}};
-  if (binding.reconstruction) report["vertex_rules"] = vertex_rules(binding.reconstruction->stencils);
+  report.update(json(diagnosis(settings, binding)));
   if (binding.on_surface()) report["distance"] = distance_range(binding.feet.distance);
-  double farthest = 0;
-  json outside_points = json::array();
-  for (const OutsidePoint& outside : binding.embedding.outside) {
-    farthest = std::max(farthest, outside.distance);
-    outside_points.push_back({{"point", outside.point}, {"distance", outside.distance}});
-  }
-  report["outside"] = {{"policy", settings.outside},
-                       {"count", binding.embedding.outside.size()},
-                       {"max_distance", farthest},
-                       {"points", outside_points}};
   return report;
 }
 
@@ -234,9 +212,15 @@ void print_summary(const DeformOptions& options, const BindSettings& settings, c
   const BindReport& bound = tally.report;
   fmt::print("{} frames of {} points written to {}\n", tally.written, bound.num_points, options.out.string());
   if (tally.resumed > 0) fmt::print("{} frames before them were there already\n", tally.resumed);
-  fmt::print("{}{}; {} of {} cells and {} of {} vertices used\n", settings.interpolant,
-             settings.rule.needs_gradients() ? " with " + settings.reconstructor : "", bound.num_active_cells,
-             bound.num_cells, bound.num_active_vertices, bound.num_vertices);
+  const std::string rule =
+      settings.interpolant.name + (settings.interpolant.needs_gradients() ? " with " + settings.reconstructor : "");
+  if (settings.is_baseline()) {
+    fmt::print("{}: {:.1f} vertices a point on average\n", rule,
+               static_cast<double>(binding.transfer->matrix().nonZeros()) / std::max(bound.num_points, 1));
+    return;
+  }
+  fmt::print("{}; {} of {} cells and {} of {} vertices used\n", rule, bound.num_active_cells, bound.num_cells,
+             bound.num_active_vertices, bound.num_vertices);
   if (binding.on_surface()) {
     const json range = distance_range(binding.feet.distance);
     fmt::print("points lie {:.4g} to {:.4g} length units from the surface\n", range["least"].get<double>(),
@@ -251,6 +235,17 @@ void print_summary(const DeformOptions& options, const BindSettings& settings, c
                settings.rest.string());
 }
 
+// What baselines cannot give: they have no gradients and no cells.
+void refuse_for_baseline(const DeformOptions& options, const BindSettings& settings) {
+  const std::array<std::pair<bool, const char*>, 5> given = {{{options.normals.has_value(), "--normals"},
+                                                              {options.tangents, "--tangents"},
+                                                              {options.gradients, "--gradients"},
+                                                              {options.stretch, "--stretch"},
+                                                              {options.tolerance > 0, "--tolerance"}}};
+  for (const auto& [is_given, option] : given)
+    if (is_given) raise("{}: {} knows vertices only and does not take it", option, settings.interpolant.name);
+}
+
 }  // namespace
 
 void deform(const DeformOptions& given) {
@@ -259,6 +254,8 @@ void deform(const DeformOptions& given) {
   // Names and options are checked before the first large file is read.
   const BindSettings settings = parse_settings(options.bind);
   options.bind.rest = settings.rest;
+  options.bind.points = settings.points;
+  if (settings.is_baseline()) refuse_for_baseline(options, settings);
   if (options.precision != "float" && options.precision != "double")
     raise("--precision {}: expected float or double", options.precision);
   if (!(options.tolerance >= 0)) raise("--tolerance {}: expected a length >= 0", options.tolerance);
@@ -272,8 +269,13 @@ void deform(const DeformOptions& given) {
   Binding binding = read_inputs(settings);
   const std::unique_ptr<FrameSource> source = open_frames(options.frames);
   if (source->num_vertices() != binding.num_vertices())
-    raise("{}: frames of {} vertices, but {} has {}", options.frames, source->num_vertices(), settings.rest.string(),
-          binding.num_vertices());
+    raise("{}: frames of {} vertices, but {} has {}{}", options.frames, source->num_vertices(), settings.rest.string(),
+          binding.num_vertices(),
+          source->num_vertices() == binding.points.rows()
+              ? fmt::format("; {} has as many: frames are those of the rest mesh, which moves the points (--rest and "
+                            "--points exchanged?)",
+                            settings.points.string())
+              : "");
   if (binding.on_surface() && source->num_columns() != 3)
     raise("{}: frames of {} coordinates, but {} is a surface in space", options.frames, source->num_columns(),
           settings.rest.string());
@@ -282,8 +284,8 @@ void deform(const DeformOptions& given) {
   locate(settings, binding);
   watch.lap("locate");
   // Offsets from a surface follow its normals, whatever the rule.
-  if (settings.rule.needs_gradients() || options.gradients || options.stretch || options.normals ||
-      binding.on_surface())
+  if (settings.interpolant.needs_gradients() || options.gradients || options.stretch || options.normals ||
+      options.tangents || binding.on_surface())
     reconstruct(settings, binding);
   watch.lap("reconstruct");
 

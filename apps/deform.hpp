@@ -17,6 +17,7 @@ struct DeformOptions {
   std::string frames;
   double tolerance = 0;
   std::optional<std::string> normals;  ///< "gradient" or "smooth"
+  bool tangents = false;               ///< by the gradients that normals take, which they come with
   bool gradients = false, stretch = false;
   std::vector<std::string> fields;  ///< NAME or NAME=FILE.npy each
   std::string precision = "double";

@@ -7,6 +7,7 @@
 #include "framework/error.hpp"
 #include "framework/interpolation_rule.hpp"
 #include "framework/json_reader.hpp"
+#include "framework/scattered_transfer.hpp"
 #include "framework/version.hpp"
 #include "reconstruction/registry.hpp"
 
@@ -45,7 +46,7 @@ std::string bash(const ProgramFacts& program) {
       }
       names.push_back(option.name);
       if (!option.value.empty())
-        values += fmt::format("    {}.{}) words=\"{}\" value=1 ;;\n", command.name, option.name, words);
+        values += fmt::format("    {}.{}) words=\"{}\" ;;\n", command.name, option.name, words);
     }
     options += fmt::format("    {}) options=\"{}\" ;;\n", command.name, fmt::join(names, " "));
   }
@@ -56,7 +57,7 @@ std::string bash(const ProgramFacts& program) {
       "# bash completion for halfgrad\n"
       "_halfgrad() {{\n"
       "  local current=${{COMP_WORDS[COMP_CWORD]}} previous=${{COMP_WORDS[COMP_CWORD-1]}}\n"
-      "  local command= word words= options=\"{}\" value=\n"
+      "  local command= word words= options=\"{}\"\n"
       "  for word in \"${{COMP_WORDS[@]:1:COMP_CWORD-1}}\"; do\n"
       "    case $word in {}) command=$word; break ;; esac\n"
       "  done\n"
@@ -71,7 +72,7 @@ std::string bash(const ProgramFacts& program) {
       "  case $command.$previous in\n"
       "{}"
       "  esac\n"
-      "  if [[ -z $value && $current == -* ]]; then words=$options; fi\n"
+      "  if [[ $current == -* ]]; then words=$options; fi\n"
       "  if [[ -n $words ]]; then COMPREPLY=($(compgen -W \"$words\" -- \"$current\")); fi\n"
       "}}\n"
       "complete -o default -F _halfgrad halfgrad\n",
@@ -233,8 +234,13 @@ std::vector<std::string> known_words(std::string_view command, std::string_view 
   std::vector<std::string> words;
   if (option == "--interpolant") {
     for (const NamedRule& rule : named_rules()) words.emplace_back(rule.name);
+    // Baselines carry displacements, which are no map to export.
+    if (command != "export")
+      for (const NamedScatteredRule& rule : scattered_rules()) words.emplace_back(rule.name);
   } else if (option == "--reconstructor") {
     for (const ReconstructorEntry& entry : reconstructor_registry()) words.emplace_back(entry.name);
+  } else if (option == "--normals") {
+    words = {"gradient", "smooth"};
   } else if (option == "--outside") {
     words = {"error", "nearest", "mark"};
   } else if (option == "--precision") {

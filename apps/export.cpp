@@ -133,18 +133,18 @@ std::vector<std::int64_t> write_transforms(const ExportOptions& options, const B
   const std::vector<std::int64_t> shape = {(last - options.first) / options.step + 1,
                                            static_cast<std::int64_t>(bones.vertices.size()), source.num_columns(),
                                            bound.mesh.gdim() + 1};
-  const Interpolant<Scalar> interpolant(bound.mesh, bound.embedding, settings.rule,
+  const Interpolant<Scalar> interpolant(bound.mesh, bound.embedding, settings.interpolant.rule,
                                         bound.reconstruction ? &*bound.reconstruction : nullptr);
   OutputFile file(path);
-  file.write(npy_header(numpy_type<Scalar>(), shape));
+  file.write(npy_header(npy_type<Scalar>(), shape));
   Progress progress(options.quiet ? ProgressMode::never : options.progress, "export", shape[0], "frames");
   Values<Scalar> values, gradients;
   std::int64_t done = 0;
   for (std::int64_t frame = options.first; frame <= last; frame += options.step) {
     source.read(static_cast<Index>(frame), values);
-    if (settings.rule.needs_gradients()) gradients = interpolant.vertex_gradients(values);
+    if (settings.interpolant.rule.needs_gradients()) gradients = interpolant.vertex_gradients(values);
     const Values<Scalar> transforms =
-        bone_transforms(bones.vertices, bound.mesh.vertices(), values, gradients, settings.rule.alpha);
+        bone_transforms(bones.vertices, bound.mesh.vertices(), values, gradients, settings.interpolant.rule.alpha);
     file.write(numpy_array("", transforms, {}).bytes);
     progress.advance(++done);
   }
@@ -173,27 +173,27 @@ std::int64_t write_bones(const ExportOptions& options, const BindSettings& setti
       {"format", "halfgrad affine bones"},
       {"version", 1},
       {"formula", "x_p = sum_k weights[p, k] * transforms[frame, indices[p, k]] @ [points[p], 1]"},
-      {"interpolant", settings.interpolant},
-      {"alpha", settings.rule.alpha},
+      {"interpolant", settings.interpolant.name},
+      {"alpha", settings.interpolant.rule.alpha},
       {"reconstructor",
-       settings.rule.needs_gradients() ? nlohmann::json(settings.reconstructor) : nlohmann::json(nullptr)},
+       settings.interpolant.rule.needs_gradients() ? nlohmann::json(settings.reconstructor) : nlohmann::json(nullptr)},
       {"num_points", num_points},
       {"num_bones", num_bones},
       {"influences", influences}};
   nlohmann::ordered_json files;
-  const auto add = [&](const std::string& name, const char* type, const std::vector<std::int64_t>& shape) {
+  const auto add = [&](const std::string& name, const std::string& type, const std::vector<std::int64_t>& shape) {
     files[name] = {{"file", beside(options.out, name).filename().string()}, {"type", type}, {"shape", shape}};
   };
   for (const NumpyArray& array : arrays) {
     write_npy_array(beside(options.out, array.name), array);
-    add(array.name, array.type.c_str(), array.shape);
+    add(array.name, array.type, array.shape);
   }
   if (source != nullptr) {
     const std::filesystem::path path = beside(options.out, "transforms");
     if (as_float)
-      add("transforms", numpy_type<float>(), write_transforms<float>(options, settings, bound, bones, *source, path));
+      add("transforms", npy_type<float>(), write_transforms<float>(options, settings, bound, bones, *source, path));
     else
-      add("transforms", numpy_type<double>(), write_transforms<double>(options, settings, bound, bones, *source, path));
+      add("transforms", npy_type<double>(), write_transforms<double>(options, settings, bound, bones, *source, path));
     manifest["first_frame"] = options.first;
     manifest["frame_step"] = options.step;
   }
@@ -203,12 +203,12 @@ std::int64_t write_bones(const ExportOptions& options, const BindSettings& setti
 }
 
 std::unique_ptr<FrameSource> open_checked_frames(const ExportOptions& options, const std::filesystem::path& rest,
-                                                 const Mesh& mesh) {
+                                                 Index num_vertices) {
   if (options.step < 1) raise("--step {}: expected 1 or more", options.step);
   std::unique_ptr<FrameSource> source = open_frames(options.frames);
-  if (source->num_vertices() != mesh.num_vertices())
+  if (source->num_vertices() != num_vertices)
     raise("{}: frames of {} vertices, but {} has {}", options.frames, source->num_vertices(), rest.string(),
-          mesh.num_vertices());
+          num_vertices);
   const std::int64_t last = options.last < 0 ? source->num_frames() - 1 : options.last;
   if (options.first < 0 || options.first > last || last >= source->num_frames())
     raise("frames {} to {} asked for: {} has frames 0 to {}", options.first, last, options.frames,
@@ -221,21 +221,29 @@ std::unique_ptr<FrameSource> open_checked_frames(const ExportOptions& options, c
 void export_map(const ExportOptions& options) {
   const std::string form = checked_form(options);
   const BindSettings settings = parse_settings(options.bind, "kriging");
-  if (form == "bones" && settings.rule.formula != Formula::blend)
+  const InterpolationRule& rule = settings.interpolant.rule;
+  if (settings.is_baseline())
+    raise(
+        "--interpolant {}: it carries displacements of vertices, which is no map of their positions; expected a rule "
+        "on cells such as phong",
+        settings.interpolant.name);
+  if (form == "bones" && rule.formula != Formula::blend)
     raise("--interpolant {}: affine bones are linear, phong and vertex_blend; export the others as a matrix",
-          settings.interpolant);
+          settings.interpolant.name);
   if (options.precision != "float" && options.precision != "double")
     raise("--precision {}: expected float or double", options.precision);
 
   Binding bound = read_inputs(settings);
-  if (bound.grid || bound.on_surface())
-    raise("{}: found a {}, maps are exported for meshes that fill their space", settings.rest.string(),
-          bound.grid ? "grid" : "surface");
+  if (bound.on_surface())
+    raise("{}: found a surface in space: what it carries follows its normals, so the map is no matrix; use deform",
+          settings.rest.string());
   const std::unique_ptr<FrameSource> source =
-      options.frames.empty() ? nullptr : open_checked_frames(options, settings.rest, bound.mesh);
+      options.frames.empty() ? nullptr : open_checked_frames(options, settings.rest, bound.num_vertices());
   locate(settings, bound);
   // Bones alone are shape functions; their transforms take the gradients.
-  if (settings.rule.needs_gradients() && (form != "bones" || source)) reconstruct(settings, bound);
+  if (rule.needs_gradients() && (form != "bones" || source)) reconstruct(settings, bound);
+  // The same cells and vertices by the same numbers.
+  if (bound.grid) bound.mesh = bound.grid->mesh();
 
   std::string what;
   if (form == "bones") {
@@ -243,9 +251,9 @@ void export_map(const ExportOptions& options) {
     what = fmt::format("{} bones for {} points", num_bones, bound.points.rows());
   } else {
     require_matrix(settings, bound);
-    SparseMatrix matrix = Interpolant<double>(bound.mesh, bound.embedding, settings.rule,
-                                              bound.reconstruction ? &*bound.reconstruction : nullptr)
-                              .matrix();
+    SparseMatrix matrix =
+        Interpolant<double>(bound.mesh, bound.embedding, rule, bound.reconstruction ? &*bound.reconstruction : nullptr)
+            .matrix();
     if (options.transpose) matrix = SparseMatrix(matrix.transpose());
     matrix.makeCompressed();
     const bool as_float = options.precision == "float";
@@ -259,7 +267,7 @@ void export_map(const ExportOptions& options) {
   }
   if (options.quiet) return;
   fmt::print("{} written to {}\n", what, options.out.string());
-  fmt::print("{}{}\n", settings.interpolant, bound.reconstruction ? " with " + settings.reconstructor : "");
+  fmt::print("{}{}\n", settings.interpolant.name, bound.reconstruction ? " with " + settings.reconstructor : "");
   if (!bound.embedding.outside.empty())
     fmt::print("{} points outside the mesh ({})\n", bound.embedding.outside.size(),
                settings.outside == "nearest" ? "carried by the nearest cell" : "without weights");

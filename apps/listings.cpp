@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "apps/diagnosis.hpp"
 #include "experiments/fields.hpp"
 #include "framework/error.hpp"
 #include "framework/interpolation_rule.hpp"
@@ -33,20 +34,6 @@ json named_list(const Entries& entries) {
   json list = json::array();
   for (const auto& entry : entries) list.push_back({{"name", entry.name}, {"summary", entry.summary}});
   return list;
-}
-
-// The first numbers of a long list.
-json shortened(const std::vector<Index>& numbers) {
-  constexpr std::size_t most = 10;
-  return {{"count", numbers.size()},
-          {"first", std::vector<Index>(numbers.begin(), numbers.begin() + std::min(most, numbers.size()))}};
-}
-
-void print_fault(const char* what, const json& fault) {
-  if (fault["count"] == 0) return;
-  fmt::print("  {:<26} {}: {}{}\n", what, fault["count"].get<std::size_t>(),
-             fmt::join(fault["first"].get<std::vector<Index>>(), ", "),
-             fault["count"].get<std::size_t>() > fault["first"].size() ? ", ..." : "");
 }
 
 }  // namespace
@@ -79,9 +66,11 @@ void list(const std::string& what, bool as_json) {
   }
 }
 
-void info(const std::filesystem::path& path, bool as_json) {
+void info(const std::filesystem::path& path, const std::vector<std::string>& limits, bool as_json) {
+  const Limits accepted(limits);
   const Mesh mesh = read_mesh(path);
   const MeshReport report = inspect(mesh);
+  const std::vector<Fault> faults = mesh_faults(mesh, report);
   json facts;
   facts["file"] = path.string();
   facts["dimension"] = mesh.gdim();
@@ -102,14 +91,10 @@ void info(const std::filesystem::path& path, bool as_json) {
   facts["edge"] = {{"min", report.min_edge}, {"mean", report.mean_edge}, {"max", report.max_edge}};
   facts["quality"] = {{"min", report.min_quality}, {"mean", report.mean_quality}};
   facts["boundary_facets"] = report.num_boundary_facets;
-  facts["nonmanifold_facets"] = report.num_nonmanifold_facets;
-  facts["degenerate_cells"] = shortened(report.degenerate_cells);
-  facts["inverted_cells"] = shortened(report.inverted_cells);
-  facts["folded_cells"] = shortened(report.folded_cells);
-  facts["unused_vertices"] = shortened(report.unused_vertices);
+  facts.update(to_json(faults));
   if (as_json) {
     fmt::print("{}\n", facts.dump(2));
-    return;
+    return accepted.check(path, faults);
   }
   fmt::print("{}: {} vertices in {} dimensions, {} cells{}\n", path.string(), mesh.num_vertices(), mesh.gdim(),
              mesh.num_cells(), mesh.is_surface() ? " of a surface" : "");
@@ -125,12 +110,8 @@ void info(const std::filesystem::path& path, bool as_json) {
   fmt::print("  {:<26} least {:.3g}, mean {:.3g} (|det J| over edge lengths, 1 is best)\n", "quality",
              report.min_quality, report.mean_quality);
   fmt::print("  {:<26} {}\n", "boundary facets", report.num_boundary_facets);
-  if (report.num_nonmanifold_facets > 0)
-    fmt::print("  {:<26} {}\n", "non-manifold facets", report.num_nonmanifold_facets);
-  print_fault("degenerate cells", facts["degenerate_cells"]);
-  print_fault("inverted cells", facts["inverted_cells"]);
-  print_fault("folded cells", facts["folded_cells"]);
-  print_fault("unused vertices", facts["unused_vertices"]);
+  fmt::print("{}", fault_lines(faults));
+  accepted.check(path, faults);
 }
 
 }  // namespace halfgrad::app

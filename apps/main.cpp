@@ -3,13 +3,13 @@
 #include <tbb/global_control.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
 
 #include "apps/deform.hpp"
-#include "apps/deform_scattered.hpp"
 #include "apps/describe.hpp"
 #include "apps/export.hpp"
 #include "apps/listings.hpp"
@@ -104,7 +104,7 @@ CommandFacts facts_of(const CLI::App& app) {
     entry.required = option->get_required();
     entry.words = known_words(facts.name, entry.name);
     const std::string type = option->get_type_name();
-    if (option->get_items_expected() > 0)
+    if (option->get_items_expected_max() > 0)
       entry.value = type.starts_with("INT") || type.starts_with("FLOAT") ? "NUMBER" : type;
     facts.options.push_back(std::move(entry));
   }
@@ -121,7 +121,7 @@ ProgramFacts facts_of_program(const CLI::App& program) {
 // What --help shows as an option's argument; CLI11 calls both file names and words TEXT.
 void name_arguments(CLI::App& app) {
   for (CLI::Option* option : app.get_options())
-    if (option->get_items_expected() > 0 && option->get_type_name() == "TEXT")
+    if (option->get_items_expected_max() > 0 && option->get_type_name() == "TEXT")
       option->type_name(known_words(app.get_name(), option->get_name(option->get_positional())).empty() ? "FILE"
                                                                                                         : "WORD");
 }
@@ -140,12 +140,22 @@ void name_arguments(CLI::App& app) {
     raise("{}{}; {}", error.what(), error.get_name() == "ConversionError" ? ", expected a number" : "", more);
   const std::string& word = unknown.front();
   if (!parsed.empty() && word.front() != '-') raise("{}: expected an option before it; {}", word, more);
-  std::vector<std::string> names;
+  std::vector<std::string> names, owners;
+  const auto has = [&](const CommandFacts& any) {
+    return std::any_of(any.options.begin(), any.options.end(), [&](const OptionFacts& o) { return o.name == word; });
+  };
   if (parsed.empty())
-    for (const CommandFacts& known : facts.commands) names.push_back(known.name);
-  for (const std::vector<OptionFacts>& options : {command.options, facts.shared.options})
-    for (const OptionFacts& option : options)
+    for (const CommandFacts& known : facts.commands) {
+      names.push_back(known.name);
+      if (has(known)) owners.push_back("halfgrad " + known.name);
+    }
+  if (!owners.empty()) raise("{} belongs behind a command: {}; {}", word, fmt::join(owners, ", "), more);
+  if (std::error_code ignored; parsed.empty() && std::filesystem::exists(word, ignored))
+    raise("{} is a file, expected a command before it, such as halfgrad info {}; {}", word, word, more);
+  if (!parsed.empty())
+    for (const OptionFacts& option : command.options)
       if (!option.positional()) names.push_back(option.name);
+  for (const OptionFacts& option : facts.shared.options) names.push_back(option.name);
   const std::vector<std::string_view> known(names.begin(), names.end());
   const std::string nearest = nearest_name(word, known);
   raise("{} is no {} of {}; {}; {}", word, parsed.empty() ? "command" : "option", name,
@@ -180,7 +190,12 @@ int dispatch(int argc, char** argv) {
       ->type_name("KEY=VALUE");
   check_app->footer("Example: halfgrad check configs/quickstart.json");
 
-  const auto add_bind_options = [](CLI::App* app, BindOptions& bind, const std::string& preferred) {
+  const auto add_limits = [](CLI::App* app, std::vector<std::string>& limits) {
+    app->add_option("--limit", limits, fmt::format("Refuse more of a fault than this: {}", join_names(fault_names())))
+        ->take_all()
+        ->type_name("NAME=NUMBER");
+  };
+  const auto add_bind_options = [&](CLI::App* app, BindOptions& bind, const std::string& preferred) {
     app->add_option("--rest", bind.rest,
                     "Rest mesh, grid or surface: .msh .vtk .vtu .mesh .node/.ele .vti .vtr .obj .ply");
     app->add_option("--points", bind.points, "Points at rest: .obj .ply .stl .vtk .vtp .vtu .npy");
@@ -192,6 +207,7 @@ int dispatch(int argc, char** argv) {
         "A name, or JSON such as '{\"kriging\": {\"drift\": \"cubic\"}}'; see halfgrad list reconstructors (default: " +
             preferred + "; for dual_taylor kriging with cubic drift)");
     app->add_option("--outside", bind.outside, "Points outside the mesh: error, nearest or mark (default: error)");
+    add_limits(app, bind.limits);
   };
   DeformOptions options;
   CLI::App* deform_app = program.add_subcommand("deform", "Carry points through a sequence");
@@ -212,6 +228,9 @@ int dispatch(int argc, char** argv) {
                    "Also carry the surface's normals: gradient (of the map, default) or smooth (across cells)")
       ->expected(0, 1)
       ->default_str("gradient");
+  deform_app->add_flag("--tangents", options.tangents,
+                       "Also carry tangents with handedness, of the surface or from its texture coordinates, by the "
+                       "gradients of --normals");
   deform_app->add_flag("--gradients", options.gradients, "Also write deformation gradients at the points");
   deform_app->add_flag("--stretch", options.stretch, "Also write principal stretches at the points");
   deform_app
@@ -231,10 +250,11 @@ int dispatch(int argc, char** argv) {
       "float");
 
   BindOptions bind;
-  std::filesystem::path binding;
+  std::filesystem::path binding, bind_report;
   CLI::App* bind_app = program.add_subcommand("bind", "Locate points once and save that for many runs of deform");
   add_bind_options(bind_app, bind, "adaptive");
   bind_app->add_option("--out", binding, "Output: .hgb")->required();
+  bind_app->add_option("--report", bind_report, "Write faults, rules of vertices and points outside as JSON");
   bind_app->footer(
       "Example: halfgrad bind --rest cage.msh --points render.obj --out render.hgb\n"
       "         halfgrad deform --binding render.hgb --frames shot12.npy --out shot12.pc2");
@@ -283,6 +303,8 @@ int dispatch(int argc, char** argv) {
   CLI::App* info_app = program.add_subcommand("info", "Counts, bounds, quality and faults of a mesh");
   info_app->add_option("mesh", mesh, "Mesh file")->required();
   info_app->add_flag("--json", as_json, "Print JSON");
+  std::vector<std::string> info_limits;
+  add_limits(info_app, info_limits);
   info_app->footer("Example: halfgrad info cage.msh");
 
   std::string format;
@@ -312,10 +334,7 @@ int dispatch(int argc, char** argv) {
   if (deform_app->parsed()) {
     options.progress = mode;
     options.quiet = quiet;
-    if (is_scattered(options.bind.interpolant.value_or("phong")))
-      deform_scattered(options);
-    else
-      deform(options);
+    deform(options);
     return all_well;
   }
   if (report_app->parsed()) {
@@ -325,7 +344,7 @@ int dispatch(int argc, char** argv) {
   }
   if (stress_app->parsed()) return stress(stress_options, stress_out, mode, quiet);
   if (bind_app->parsed()) {
-    save_binding(bind, binding, quiet);
+    save_binding(bind, binding, bind_report, quiet);
     return all_well;
   }
   if (export_app->parsed()) {
@@ -339,7 +358,7 @@ int dispatch(int argc, char** argv) {
     return all_well;
   }
   if (info_app->parsed()) {
-    info(mesh, as_json);
+    info(mesh, info_limits, as_json);
     return all_well;
   }
   if (describe_app->parsed()) {

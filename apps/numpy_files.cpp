@@ -2,15 +2,13 @@
 
 #include <zip.h>
 
-#include <bit>
 #include <ctime>
 
 #include "framework/error.hpp"
+#include "framework/io/npy.hpp"
 #include "framework/io/output_file.hpp"
 
 namespace halfgrad::app {
-
-static_assert(std::endian::native == std::endian::little, "type strings say little-endian");
 
 namespace {
 
@@ -69,16 +67,6 @@ class ZipFile {
 };
 
 }  // namespace
-
-std::string npy_header(std::string_view type, std::span<const std::int64_t> shape) {
-  std::string text = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}{}), }}", type,
-                                 fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
-  // NumPy asks for a multiple of 64 bytes with the ten before the text.
-  text.resize((text.size() + 1 + 10 + 63) / 64 * 64 - 11, ' ');
-  text += '\n';
-  return std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(text.size() & 255) +
-         static_cast<char>(text.size() >> 8) + text;
-}
 
 void write_npy_array(const std::filesystem::path& path, const NumpyArray& array) {
   OutputFile file(path);

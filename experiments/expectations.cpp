@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
@@ -50,7 +50,7 @@ void read_which(JsonReader& reader, std::string_view key, int& which, bool& ever
   else if (*value != "last") {
     if (!value->is_number_integer())
       raise("{}: found {}, expected a whole number, \"last\" or \"all\"", reader.pointer_to(key), value->dump());
-    which = value->get<int>();
+    which = small_integer(*value, reader.pointer_to(key));
   }
 }
 

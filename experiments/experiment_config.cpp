@@ -5,7 +5,7 @@
 
 #include "framework/error.hpp"
 #include "framework/io/input_file.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
@@ -15,20 +15,21 @@ namespace {
 
 json read_json_file(const std::filesystem::path& path) {
   const InputFile file(path);
-  try {
-    return json::parse(file.bytes());
-  } catch (const json::parse_error& error) {
-    raise("{}: not JSON: {}", path.string(), error.what());
-  }
+  return parse_json(file.bytes(), path.string());
 }
 
 void apply_override(json& config, const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || text[0] != '/') raise("--set: found \"{}\", expected /json/pointer=VALUE", text);
   const std::string pointer = text.substr(0, equals), value = text.substr(equals + 1);
-  json parsed = json::parse(value, nullptr, false);
-  if (parsed.is_discarded()) parsed = value;
+  json parsed;
   try {
+    parsed = parse_json(value, text);
+  } catch (const Error&) {
+    parsed = value;
+  }
+  try {
+    parsed.dump();  // throws where a text is not UTF-8
     config[json::json_pointer(pointer)] = std::move(parsed);
   } catch (const json::exception& error) {
     raise("--set {}: no such place in the configuration ({})", pointer, error.what());
@@ -64,10 +65,10 @@ FrameFiles read_frame_files(const json& specification, const std::string& pointe
           files.frames.size(), num_levels);
   if (with_truth) files.truth = directory / reader.text("truth");
   if (const json* select = reader.find("select")) {
-    const auto whole = [](const json& entry) { return entry.is_number_integer(); };
-    if (!select->is_array() || select->empty() || !std::all_of(select->begin(), select->end(), whole))
+    if (!select->is_array() || select->empty())
       raise("{}: found {}, expected an array of frame numbers", reader.pointer_to("select"), select->dump());
-    files.select = select->get<std::vector<int>>();
+    for (std::size_t i = 0; i < select->size(); ++i)
+      files.select.push_back(small_integer((*select)[i], fmt::format("{}/{}", reader.pointer_to("select"), i)));
   }
   reader.finish();
   resolved = reader.resolved();

@@ -1,11 +1,13 @@
 #include "experiments/fields.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "experiments/jet.hpp"
 #include "experiments/random.hpp"
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
@@ -144,7 +146,7 @@ struct Polynomial {
 template <int D>
 std::unique_ptr<Field> make_polynomial_in(JsonReader& options, const FieldSetting& setting) {
   Polynomial<D> field;
-  field.degree = static_cast<int>(options.integer("degree", 2));
+  field.degree = small_integer(options, "degree", 2);
   if (field.degree < 0 || field.degree > 8)
     raise("{}: found {}, expected 0 to 8", options.pointer_to("degree"), field.degree);
   // Graded order: all of degree 0, then 1, …; within a degree the first axis' power falls.
@@ -385,30 +387,15 @@ std::span<const FieldEntry> field_registry() {
 
 std::unique_ptr<Field> make_field(const json& specification, const std::string& pointer, const FieldSetting& setting,
                                   json* resolved) {
-  std::string name, where = pointer;
-  json options = json::object();
-  if (specification.is_string()) {
-    name = specification.get<std::string>();
-  } else if (specification.is_object() && specification.size() == 1) {
-    name = specification.begin().key();
-    options = specification.begin().value();
-    where += "/" + name;
-  } else {
-    raise("{}: found {}, expected a field's name or {{\"name\": {{options}}}}", pointer, specification.dump());
-  }
   std::vector<std::string_view> names;
-  for (const FieldEntry& entry : field_registry()) {
-    names.push_back(entry.name);
-    if (entry.name != name) continue;
-    JsonReader reader(options, where);
-    std::unique_ptr<Field> field = entry.make(reader, setting);
-    reader.finish();
-    if (resolved != nullptr) *resolved = json{{name, reader.resolved()}};
-    return field;
-  }
-  const std::string nearest = nearest_name(name, names);
-  raise("{}: no field \"{}\"; known: {}, and {{\"frames\": file, \"truth\": file}}{}", pointer, name, join_names(names),
-        nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
+  for (const FieldEntry& entry : field_registry()) names.push_back(entry.name);
+  const NamedOptions chosen = read_named_options(specification, pointer, "field", names);
+  const auto entry = std::ranges::find(field_registry(), chosen.name, &FieldEntry::name);
+  JsonReader reader(*chosen.options, chosen.pointer);
+  std::unique_ptr<Field> field = entry->make(reader, setting);
+  reader.finish();
+  if (resolved != nullptr) *resolved = json{{chosen.name, reader.resolved()}};
+  return field;
 }
 
 Points field_values(const Field& field, const Points& positions) {

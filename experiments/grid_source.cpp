@@ -5,6 +5,7 @@
 
 #include "experiments/per_axis.hpp"
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
@@ -53,7 +54,7 @@ Occupancy read_occupancy(JsonReader& reader, int gdim) {
 
 GridSource read_grid_source(const json& specification, const std::string& pointer, json& resolved) {
   JsonReader reader(specification, pointer);
-  const auto gdim = static_cast<int>(reader.integer("dimension", 3));
+  const auto gdim = small_integer(reader, "dimension", 3);
   if (gdim < 1 || gdim > 3) raise("{}: found {}, expected 1 to 3", reader.pointer_to("dimension"), gdim);
   const auto cells = per_axis<int>(reader, "cells", 8, gdim);
   const auto size = per_axis<double>(reader, "size", 1, gdim);
@@ -70,7 +71,7 @@ GridSource read_grid_source(const json& specification, const std::string& pointe
   const auto make = [=](double refinement) {
     std::vector<GridAxis> axes;
     for (int a = 0; a < gdim; ++a)
-      axes.push_back(make_axis(static_cast<int>(std::lround(cells[a] * refinement)), origin[a], size[a], grading[a]));
+      axes.push_back(make_axis(refined_count(cells[a], refinement), origin[a], size[a], grading[a]));
     Grid full(axes);
     if (!occupied) return full;
     std::vector<GridPlace> places;

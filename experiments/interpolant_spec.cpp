@@ -1,6 +1,5 @@
 #include "experiments/interpolant_spec.hpp"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
@@ -28,26 +27,12 @@ void read_scattered(JsonReader& reader, ScatteredRule& rule) {
 }  // namespace
 
 ConfiguredInterpolant read_interpolant(const json& specification, const std::string& pointer, json& resolved) {
-  std::string name;
-  json options = json::object();
-  if (specification.is_string()) {
-    name = specification.get<std::string>();
-  } else if (specification.is_object() && specification.size() == 1) {
-    name = specification.begin().key();
-    options = specification.begin().value();
-  } else {
-    raise("{}: found {}, expected an interpolant's name or {{\"name\": {{options}}}}", pointer, specification.dump());
-  }
   std::vector<std::string_view> names;
   for (const NamedRule& known : named_rules()) names.push_back(known.name);
   for (const NamedScatteredRule& known : scattered_rules()) names.push_back(known.name);
-  if (std::find(names.begin(), names.end(), name) == names.end()) {
-    const std::string nearest = nearest_name(name, names);
-    raise("{}: no interpolant \"{}\"; known: {}{}", pointer, name, join_names(names),
-          nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
-  }
+  const auto [name, where, options] = read_named_options(specification, pointer, "interpolant", names);
   ConfiguredInterpolant interpolant{name, {}, find_scattered_rule(name), {}};
-  JsonReader reader(options, pointer + "/" + name);
+  JsonReader reader(*options, where);
   if (interpolant.scattered) {
     read_scattered(reader, *interpolant.scattered);
     interpolant.options = reader.resolved().dump();

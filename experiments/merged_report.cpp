@@ -8,6 +8,7 @@
 #include "experiments/interactive_report.hpp"
 #include "framework/error.hpp"
 #include "framework/io/output_file.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
@@ -73,7 +74,7 @@ ResultRow read_row(const json& entry) {
 }
 
 ExperimentResult parse_results(const std::string& text) {
-  const json document = json::parse(text);
+  const json document = parse_json(text, "results.json");
   ExperimentResult result;
   result.name = document.at("name");
   result.config = document.at("config").dump();

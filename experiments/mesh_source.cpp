@@ -11,7 +11,7 @@
 #include "framework/error.hpp"
 #include "framework/io/formats.hpp"
 #include "framework/io/mesh_file.hpp"
-#include "framework/json_reader.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
@@ -44,7 +44,7 @@ MeshSource lattice_source(const json& specification, const std::string& pointer,
   resolved = reader.resolved();
   const auto at_level = [=](int level) {
     LatticeOptions finer = options;
-    for (int& cells : finer.cells) cells = static_cast<int>(std::lround(cells * std::pow(factor, level)));
+    for (int& cells : finer.cells) cells = refined_count(cells, std::pow(factor, level));
     finer.seed = seed + static_cast<std::uint64_t>(level);
     return make_lattice(finer);
   };
@@ -86,15 +86,15 @@ MeshSource random_delaunay_source(const json& specification, const std::string& 
                                   std::uint64_t seed, json& resolved) {
   JsonReader reader(specification, pointer);
   RandomDelaunayOptions options;
-  options.gdim = static_cast<int>(reader.integer("dimension", options.gdim));
+  options.gdim = small_integer(reader, "dimension", options.gdim);
   if (options.gdim != 2 && options.gdim != 3)
     raise("{}: found {}, expected 2 or 3", reader.pointer_to("dimension"), options.gdim);
-  options.num_points = static_cast<Index>(reader.integer("vertices", options.num_points));
+  options.num_points = small_integer(reader, "vertices", options.num_points);
   reader.finish();
   resolved = reader.resolved();
   const auto at_level = [=](int level) {
     RandomDelaunayOptions finer = options;
-    finer.num_points = static_cast<Index>(std::lround(options.num_points * std::pow(factor, options.gdim * level)));
+    finer.num_points = refined_count(options.num_points, std::pow(factor, options.gdim * level));
     finer.seed = seed + static_cast<std::uint64_t>(level);
     return make_random_delaunay(finer);
   };

@@ -149,11 +149,13 @@ Vector center_of(JsonReader& reader) {
   return center;
 }
 
-/// A surface is the same for all levels, and lives in space.
-PointSource surface(PointCloud cloud, const std::string& pointer) {
-  return [cloud = std::move(cloud), pointer](const Mesh& mesh, int) {
+/// A surface is the same for all levels, and lives in space. It is made where it is used: a check of a configuration
+/// makes no points.
+template <class Make>
+PointSource surface(Make make, const std::string& pointer) {
+  return [make, pointer](const Mesh& mesh, int) {
     if (mesh.gdim() != 3) raise("{}: a surface of space, but the mesh has dimension {}", pointer, mesh.gdim());
-    return cloud;
+    return make();
   };
 }
 
@@ -188,13 +190,18 @@ PointSource grid_source(JsonReader& reader, const std::string& pointer, std::uin
 PointSource geodesic_source(JsonReader& reader, const std::string& pointer, std::uint64_t) {
   const int frequency = count_of(reader, "frequency", 35, 1, 1000);
   const double radius = length_of(reader, "radius", 0.45);
-  return surface(geodesic_sphere(frequency, radius, center_of(reader)), pointer);
+  const Vector center = center_of(reader);
+  return surface([=] { return geodesic_sphere(frequency, radius, center); }, pointer);
 }
 
 PointSource cylinder_source(JsonReader& reader, const std::string& pointer, std::uint64_t) {
   const double radius = length_of(reader, "radius", 0.3), height = length_of(reader, "height", 0.8);
   const int around = count_of(reader, "around", 96, 3, 100000), along = count_of(reader, "along", 64, 1, 100000);
-  return surface(cylinder_surface(radius, height, around, along, center_of(reader)), pointer);
+  constexpr std::int64_t most_points = 100'000'000;
+  if (std::int64_t{around} * (along + 1) > most_points)
+    raise("{}: found {} points around and {} along, expected at most {} in all", pointer, around, along, most_points);
+  const Vector center = center_of(reader);
+  return surface([=] { return cylinder_surface(radius, height, around, along, center); }, pointer);
 }
 
 PointSource tessellation_source(JsonReader& reader, const std::string&, std::uint64_t) {

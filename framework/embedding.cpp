@@ -99,6 +99,7 @@ void check_points(const Points& points, int gdim, const EmbedOptions& options) {
     raise("{} points: at most {} can be numbered", points.rows(), std::numeric_limits<Index>::max());
   if (!(options.tolerance >= 0) || !(options.tolerance < 0.1))
     raise("an embedding tolerance of {}: expected a number from 0 to 0.1", options.tolerance);
+  if (points.allFinite()) return;
   for (Index p = 0; p < points.rows(); ++p)
     if (!points.row(p).allFinite()) raise("point {} is {}: expected finite coordinates", p, describe(points, p));
 }

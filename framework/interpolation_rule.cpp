@@ -30,9 +30,7 @@ InterpolationRule named_rule(std::string_view name) {
     if (rule.name == name) return rule.rule;
     names.push_back(rule.name);
   }
-  const std::string nearest = nearest_name(name, names);
-  raise("no interpolant \"{}\"; known: {}{}", name, join_names(names),
-        nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
+  raise("no interpolant \"{}\"; known: {}", name, known_names(name, names));
 }
 
 }  // namespace halfgrad

@@ -6,19 +6,13 @@
 #include <numeric>
 
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 
 namespace halfgrad {
 
 using nlohmann::json;
 
 namespace {
-
-// What a reader was found to be, short enough for a message.
-std::string shown(const json& value) {
-  std::string text = value.dump();
-  if (text.size() > 60) text = text.substr(0, 57) + "...";
-  return fmt::format("{} {}", value.type_name(), text);
-}
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -52,10 +46,35 @@ std::string nearest_name(std::string_view word, const std::vector<std::string_vi
 
 std::string join_names(const std::vector<std::string_view>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
 
+std::string known_names(std::string_view word, const std::vector<std::string_view>& known) {
+  const std::string nearest = nearest_name(word, known);
+  return nearest.empty() ? join_names(known) : fmt::format("{}; did you mean \"{}\"?", join_names(known), nearest);
+}
+
+NamedOptions read_named_options(const json& specification, const std::string& pointer, std::string_view kind,
+                                const std::vector<std::string_view>& known) {
+  static const json none = json::object();
+  NamedOptions choice{"", pointer, &none};
+  if (specification.is_string()) {
+    choice.name = specification.get<std::string>();
+  } else if (specification.is_object() && specification.size() == 1) {
+    choice.name = specification.begin().key();
+    choice.pointer += "/" + choice.name;
+    choice.options = &specification.begin().value();
+  } else {
+    raise("{}: found {}, expected one {}: its name, or {{\"name\": {{options}}}}",
+          pointer.empty() ? kind : std::string_view(pointer), described(specification), kind);
+  }
+  if (std::find(known.begin(), known.end(), choice.name) == known.end())
+    raise("{}: no {} \"{}\"; known: {}", pointer.empty() ? kind : std::string_view(pointer), kind, choice.name,
+          known_names(choice.name, known));
+  return choice;
+}
+
 JsonReader::JsonReader(const json& value, std::string pointer)
     : object_(&value), pointer_(std::move(pointer)), resolved_(std::make_unique<json>(json::object())) {
   if (!value.is_object())
-    raise("{}: found {}, expected an object", pointer_.empty() ? "the document" : pointer_, shown(value));
+    raise("{}: found {}, expected an object", pointer_.empty() ? "the document" : pointer_, described(value));
 }
 
 JsonReader::~JsonReader() = default;
@@ -89,7 +108,7 @@ double JsonReader::number(std::string_view key, double fallback) {
 double JsonReader::number(std::string_view key) {
   const json& value = at(key);
   if (!value.is_number() || !std::isfinite(value.get<double>()))
-    raise("{}: found {}, expected a finite number", pointer_to(key), shown(value));
+    raise("{}: found {}, expected a finite number", pointer_to(key), described(value));
   return value.get<double>();
 }
 
@@ -99,17 +118,7 @@ std::int64_t JsonReader::integer(std::string_view key, std::int64_t fallback) {
   return fallback;
 }
 
-std::int64_t JsonReader::integer(std::string_view key) {
-  const json& value = at(key);
-  if (value.is_number_integer() && !(value.is_number_unsigned() && value.get<std::uint64_t>() > INT64_MAX))
-    return value.get<std::int64_t>();
-  // 1e6 is how people write a million.
-  if (value.is_number_float()) {
-    const double number = value.get<double>();
-    if (std::abs(number) < 9e15 && number == std::floor(number)) return static_cast<std::int64_t>(number);
-  }
-  raise("{}: found {}, expected a whole number", pointer_to(key), shown(value));
-}
+std::int64_t JsonReader::integer(std::string_view key) { return whole_number(at(key), pointer_to(key)); }
 
 bool JsonReader::boolean(std::string_view key, bool fallback) {
   if (!has(key)) {
@@ -117,7 +126,7 @@ bool JsonReader::boolean(std::string_view key, bool fallback) {
     return fallback;
   }
   const json& value = at(key);
-  if (!value.is_boolean()) raise("{}: found {}, expected true or false", pointer_to(key), shown(value));
+  if (!value.is_boolean()) raise("{}: found {}, expected true or false", pointer_to(key), described(value));
   return value.get<bool>();
 }
 
@@ -129,18 +138,15 @@ std::string JsonReader::text(std::string_view key, std::string_view fallback) {
 
 std::string JsonReader::text(std::string_view key) {
   const json& value = at(key);
-  if (!value.is_string()) raise("{}: found {}, expected a string", pointer_to(key), shown(value));
+  if (!value.is_string()) raise("{}: found {}, expected a string", pointer_to(key), described(value));
   return value.get<std::string>();
 }
 
 std::string JsonReader::choice(std::string_view key, const std::vector<std::string_view>& known,
                                std::string_view fallback) {
   const std::string word = text(key, fallback);
-  if (std::find(known.begin(), known.end(), word) == known.end()) {
-    const std::string nearest = nearest_name(word, known);
-    raise("{}: found \"{}\", expected one of {}{}", pointer_to(key), word, join_names(known),
-          nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
-  }
+  if (std::find(known.begin(), known.end(), word) == known.end())
+    raise("{}: found \"{}\", expected one of {}", pointer_to(key), word, known_names(word, known));
   return word;
 }
 
@@ -148,9 +154,7 @@ void JsonReader::finish() const {
   for (const auto& [key, value] : object_->items())
     if (std::find(known_.begin(), known_.end(), key) == known_.end()) {
       const std::vector<std::string_view> names(known_.begin(), known_.end());
-      const std::string nearest = nearest_name(key, names);
-      raise("{}: unknown key; known here: {}{}", pointer_to(key), names.empty() ? "none" : join_names(names),
-            nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
+      raise("{}: unknown key; known here: {}", pointer_to(key), names.empty() ? "none" : known_names(key, names));
     }
 }
 

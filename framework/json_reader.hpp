@@ -50,10 +50,25 @@ class JsonReader {
   std::unique_ptr<nlohmann::json> resolved_;
 };
 
+/// What "name" or {"name": {options}} chooses.
+struct NamedOptions {
+  std::string name;
+  std::string pointer;            ///< of the options
+  const nlohmann::json* options;  ///< part of the specification, or a constant empty object
+};
+
+/// Reads the choice of one `kind` ("field", …), whose names are `known`; throws Error with them. The specification must
+/// outlive the result.
+NamedOptions read_named_options(const nlohmann::json& specification, const std::string& pointer, std::string_view kind,
+                                const std::vector<std::string_view>& known);
+
 /// The entry of `known` closest to `word` by edit distance, or empty where none is near.
 std::string nearest_name(std::string_view word, const std::vector<std::string_view>& known);
 
 /// "a, b, c" for error messages.
 std::string join_names(const std::vector<std::string_view>& names);
+
+/// "a, b, c; did you mean "b"?": the known names, and the nearest where one is near.
+std::string known_names(std::string_view word, const std::vector<std::string_view>& known);
 
 }  // namespace halfgrad

@@ -191,29 +191,60 @@ ScatteredTransfer::ScatteredTransfer(const Mesh& mesh, const Points& points, con
   matrix_ = with_gradients(matrix_, rest_, points_, reconstruction.stencils);
 }
 
+ScatteredTransfer ScatteredTransfer::from_weights(const Mesh& mesh, const Points& points, Matrix weights) {
+  if (weights.rows() != points.rows() || weights.cols() != mesh.num_vertices() || points.cols() != mesh.gdim())
+    raise("weights of {} x {}, expected {} points by {} vertices", weights.rows(), weights.cols(), points.rows(),
+          mesh.num_vertices());
+  ScatteredTransfer transfer;
+  transfer.rest_ = mesh.vertices();
+  transfer.points_ = points;
+  transfer.matrix_ = std::move(weights);
+  return transfer;
+}
+
 template <class Scalar>
-Values<Scalar> ScatteredTransfer::evaluate(const Values<Scalar>& values) const {
-  const Eigen::Index d = rest_.cols();
+void ScatteredTransfer::apply(const Values<Scalar>& values, Eigen::Index num_positions, Values<Scalar>& out) const {
   if (values.rows() != rest_.rows()) raise("{} values for {} vertices", values.rows(), rest_.rows());
-  if (values.cols() < d)
-    raise("vertices of {} coordinates, but the mesh at rest has {}: displacements need as many", values.cols(), d);
-  Values<Scalar> result(points_.rows(), values.cols());
+  out.resize(points_.rows(), values.cols());
   parallel_for(points_.rows(), grain, [&](std::int64_t begin, std::int64_t end) {
     Eigen::RowVectorXd sum(values.cols());
     for (std::int64_t p = begin; p < end; ++p) {
       sum.setZero();
       for (Matrix::InnerIterator entry(matrix_, p); entry; ++entry) {
         sum += entry.value() * values.row(entry.col()).template cast<double>();
-        sum.head(d) -= entry.value() * rest_.row(entry.col());
+        sum.head(num_positions) -= entry.value() * rest_.row(entry.col()).head(num_positions);
       }
-      sum.head(d) += points_.row(p);
-      result.row(p) = sum.template cast<Scalar>();
+      sum.head(num_positions) += points_.row(p).head(num_positions);
+      out.row(p) = sum.template cast<Scalar>();
     }
   });
-  return result;
+}
+
+template <class Scalar>
+void ScatteredTransfer::evaluate(const Values<Scalar>& values, Values<Scalar>& out) const {
+  if (values.cols() < rest_.cols())
+    raise("vertices of {} coordinates, but the mesh at rest has {}: displacements need as many", values.cols(),
+          rest_.cols());
+  apply(values, rest_.cols(), out);
+}
+
+template <class Scalar>
+Values<Scalar> ScatteredTransfer::evaluate(const Values<Scalar>& values) const {
+  Values<Scalar> out;
+  evaluate(values, out);
+  return out;
+}
+
+template <class Scalar>
+void ScatteredTransfer::evaluate_field(const Values<Scalar>& values, Values<Scalar>& out) const {
+  apply(values, 0, out);
 }
 
 template Values<float> ScatteredTransfer::evaluate(const Values<float>&) const;
 template Values<double> ScatteredTransfer::evaluate(const Values<double>&) const;
+template void ScatteredTransfer::evaluate(const Values<float>&, Values<float>&) const;
+template void ScatteredTransfer::evaluate(const Values<double>&, Values<double>&) const;
+template void ScatteredTransfer::evaluate_field(const Values<float>&, Values<float>&) const;
+template void ScatteredTransfer::evaluate_field(const Values<double>&, Values<double>&) const;
 
 }  // namespace halfgrad

@@ -49,15 +49,29 @@ class ScatteredTransfer {
   /// of range, non-finite points, a mesh without cells, and gradients that depend on the data.
   ScatteredTransfer(const Mesh& mesh, const Points& points, const ScatteredRule& rule,
                     const VertexGradientReconstructor* reconstructor = nullptr);
+  /// With the weights of an earlier transfer, #points × #vertices. Throws Error where their size is another.
+  static ScatteredTransfer from_weights(const Mesh& mesh, const Points& points,
+                                        Eigen::SparseMatrix<double, Eigen::RowMajor> weights);
 
   /// Values at the points, #points × #columns, from deformed vertices, #vertices × #columns with #columns ≥ gdim: rest
   /// positions have zeros in the columns beyond gdim.
   template <class Scalar>
   Values<Scalar> evaluate(const Values<Scalar>& values) const;
+  /// The same into the caller's memory.
+  template <class Scalar>
+  void evaluate(const Values<Scalar>& values, Values<Scalar>& out) const;
+  /// M times any vertex data: what the rule makes of values that are no positions.
+  template <class Scalar>
+  void evaluate_field(const Values<Scalar>& values, Values<Scalar>& out) const;
   /// The weights M of evaluate(x) = X + M (x − rest), #points × #vertices.
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix() const { return matrix_; }
 
  private:
+  ScatteredTransfer() = default;
+  // M (values − rest) + points in the first columns, M values in the others.
+  template <class Scalar>
+  void apply(const Values<Scalar>& values, Eigen::Index num_positions, Values<Scalar>& out) const;
+
   Points rest_, points_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> matrix_;
 };

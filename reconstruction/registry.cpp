@@ -1,9 +1,11 @@
 #include "reconstruction/registry.hpp"
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 
 #include "framework/error.hpp"
+#include "framework/json_values.hpp"
 #include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
 #include "reconstruction/centered_difference.hpp"
@@ -35,20 +37,20 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
       ReconstructorEntry{"knn", "the same weights over the adjacent cells and the k cells whose centroids are nearest",
                          [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
                            KnnOptions knn;
-                           knn.k = static_cast<int>(options.integer("k", knn.k));
+                           knn.k = small_integer(options, "k", knn.k);
                            knn.epsilon = options.number("epsilon", knn.epsilon);
                            return std::make_unique<Knn>(knn);
                          }},
       ReconstructorEntry{"spr", "linear fit of the cells' gradients at their centroids (Zienkiewicz and Zhu 1992)",
                          [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
                            SprOptions spr;
-                           spr.rings = static_cast<int>(options.integer("rings", spr.rings));
+                           spr.rings = small_integer(options, "rings", spr.rings);
                            return std::make_unique<Spr>(spr);
                          }},
       ReconstructorEntry{"ppr", "gradient of a quadratic fitted to the values around a vertex (Zhang and Naga 2005)",
                          [](JsonReader& options) -> std::unique_ptr<VertexGradientReconstructor> {
                            PprOptions ppr;
-                           ppr.rings = static_cast<int>(options.integer("rings", ppr.rings));
+                           ppr.rings = small_integer(options, "rings", ppr.rings);
                            return std::make_unique<Ppr>(ppr);
                          }},
       ReconstructorEntry{"kriging", "vertex stencil, exact for quadratics (or cubics), Matern prior for the rest",
@@ -74,34 +76,17 @@ std::span<const ReconstructorEntry> reconstructor_registry() {
 
 MadeReconstructor make_reconstructor(const nlohmann::json& specification, const std::string& pointer,
                                      std::span<const ReconstructorEntry> further) {
-  std::string name;
-  nlohmann::json options = nlohmann::json::object();
-  std::string where = pointer;
-  if (specification.is_string()) {
-    name = specification.get<std::string>();
-  } else if (specification.is_object() && specification.size() == 1) {
-    name = specification.begin().key();
-    options = specification.begin().value();
-    where += "/" + name;
-  } else {
-    raise("{}: found {}, expected a reconstructor's name or {{\"name\": {{options}}}}",
-          pointer.empty() ? "reconstructor" : pointer, specification.dump());
-  }
+  std::vector<ReconstructorEntry> entries(reconstructor_registry().begin(), reconstructor_registry().end());
+  entries.insert(entries.end(), further.begin(), further.end());
   std::vector<std::string_view> names;
-  for (const std::span<const ReconstructorEntry> entries : {reconstructor_registry(), further})
-    for (const ReconstructorEntry& entry : entries) {
-      if (entry.name == name) {
-        JsonReader reader(options, where);
-        MadeReconstructor made{name, "", entry.make(reader)};
-        reader.finish();
-        made.options = reader.resolved().dump();
-        return made;
-      }
-      names.push_back(entry.name);
-    }
-  const std::string nearest = nearest_name(name, names);
-  raise("{}: no reconstructor \"{}\"; known: {}{}", pointer.empty() ? "reconstructor" : pointer, name,
-        join_names(names), nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest));
+  for (const ReconstructorEntry& entry : entries) names.push_back(entry.name);
+  const NamedOptions chosen = read_named_options(specification, pointer, "reconstructor", names);
+  const auto entry = std::ranges::find(entries, chosen.name, &ReconstructorEntry::name);
+  JsonReader reader(*chosen.options, chosen.pointer);
+  MadeReconstructor made{chosen.name, "", entry->make(reader)};
+  reader.finish();
+  made.options = reader.resolved().dump();
+  return made;
 }
 
 }  // namespace halfgrad

@@ -5,6 +5,7 @@
 #   - includes name files from the root of the repository, and the files exist
 #   - elements know Eigen and the standard library only
 #   - headers have #pragma once and leave the slow third-party headers to .cpp files
+#   - a source includes the header of its name first, so that its own build shows that the header compiles alone
 #   - only apps print
 set -uo pipefail
 cd "$1" || exit
@@ -38,6 +39,12 @@ for layer in "${layers[@]}"; do
   while read -r file; do
     report "$file:1" "no #pragma once"
   done < <(grep -rL '^#pragma once' --include='*.hpp' "$layer")
+
+  while read -r file; do
+    header=${file%.cpp}.hpp
+    [[ ! -f $header || $(grep -m 1 -E '^#include' "$file") == "#include \"$header\"" ]] ||
+      report "$file:1" "the first include is \"$header\""
+  done < <(find "$layer" -name '*.cpp')
 
   [[ $layer == apps ]] && continue
   while IFS=: read -r file line _; do

@@ -1,19 +1,12 @@
 #include "framework/io/field_source.hpp"
 
 #include "framework/error.hpp"
-#include "framework/io/formats.hpp"
 #include "framework/io/npy.hpp"
 #include "framework/json_reader.hpp"
 
 namespace halfgrad {
 
 namespace {
-
-// The point data of a file, or none where the format holds no points (.npy and .pc2 sequences).
-std::vector<PointArray> arrays_of(const std::filesystem::path& file) {
-  if (find_format(file, FormatUse::open_frames).open_frames != nullptr) return {};
-  return read_points(file).arrays;
-}
 
 void check_values(const std::string& file, const std::string& name, const Values<double>& values, Index num_vertices) {
   if (values.rows() != num_vertices)
@@ -38,17 +31,17 @@ FieldSource::FieldSource(const std::string& spec, const std::filesystem::path& r
             array_->num_vertices(), frames.num_frames(), frames.num_vertices());
     return;
   }
-  const std::vector<PointArray> moving = arrays_of(frames.frame_name(0));
+  const std::span<const PointArray> moving = frames.arrays();
   if (find_array(moving, name_) != nullptr) return;
-  const std::vector<PointArray> fixed = arrays_of(rest);
+  const std::vector<PointArray> fixed = read_points(rest).arrays;
   if (const PointArray* array = find_array(fixed, name_)) {
     constant_ = array->values;
     check_values(rest.string(), name_, constant_, frames.num_vertices());
     return;
   }
   std::vector<std::string_view> known;
-  for (const std::vector<PointArray>* arrays : {&moving, &fixed})
-    for (const PointArray& array : *arrays) known.push_back(array.name);
+  for (const std::span<const PointArray> arrays : {moving, std::span<const PointArray>(fixed)})
+    for (const PointArray& array : arrays) known.push_back(array.name);
   raise("field \"{}\": neither {} nor {} has point data of this name; {}", name_, frames.frame_name(0), rest.string(),
         known.empty() ? "they have none: give NAME=FILE.npy" : "they have " + join_names(known));
 }
@@ -60,8 +53,7 @@ void FieldSource::read(Index frame, Values<double>& out) {
     out = constant_;
   } else {
     const std::string file = frames_.frame_name(frame);
-    const std::vector<PointArray> arrays = arrays_of(file);
-    const PointArray* array = find_array(arrays, name_);
+    const PointArray* array = find_array(frames_.arrays(), name_);
     if (array == nullptr) raise("{}: frame {} has no point data \"{}\"", file, frame, name_);
     check_values(file, name_, array->values, frames_.num_vertices());
     out = array->values;

@@ -18,7 +18,7 @@ class FieldSource {
   FieldSource(const std::string& spec, const std::filesystem::path& rest, const FrameSource& frames);
 
   const std::string& name() const { return name_; }
-  /// The values of a frame, #vertices × #columns. Throws Error on non-finite values.
+  /// The values of the frame that `frames` read last, #vertices × #columns. Throws Error on non-finite values.
   void read(Index frame, Values<double>& out);
 
  private:

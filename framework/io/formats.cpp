@@ -102,7 +102,13 @@ const Format& find_format(const std::filesystem::path& path, FormatUse use) {
 
 std::unique_ptr<FrameSink> create_frames(const std::filesystem::path& path, const PointSet& shape,
                                          const FrameSinkOptions& options) {
-  return find_format(path, FormatUse::create_frames).create_frames(path, shape, options);
+  const Format& format = find_format(path, FormatUse::create_frames);
+  // Before the first frame is computed, and by the name that the caller gave.
+  std::error_code ignored;
+  if (const std::filesystem::path folder = path.parent_path();
+      !folder.empty() && !std::filesystem::exists(folder, ignored))
+    raise("{}: cannot be written: No such file or directory: make the folder {} first", path.string(), folder.string());
+  return format.create_frames(path, shape, options);
 }
 
 }  // namespace halfgrad

@@ -22,14 +22,16 @@ const PointArray* displacement_of(const PointSet& set) {
 
 class FileFrames final : public FrameSource {
  public:
-  FileFrames(const std::string& name, std::vector<fs::path> files, Points first, bool displaced)
-      : FrameSource(name, static_cast<Index>(files.size()), static_cast<Index>(first.rows()),
-                    static_cast<int>(first.cols())),
+  FileFrames(const std::string& name, std::vector<fs::path> files, PointSet first, bool displaced)
+      : FrameSource(name, static_cast<Index>(files.size()), static_cast<Index>(first.points.rows()),
+                    static_cast<int>(first.points.cols())),
         files_(std::move(files)),
-        first_(std::move(first)),
+        first_(std::move(first.points)),
+        arrays_(std::move(first.arrays)),
         displaced_(displaced) {}
 
   std::string frame_name(Index frame) const override { return files_[static_cast<std::size_t>(frame)].string(); }
+  std::span<const PointArray> arrays() const override { return arrays_; }
 
  private:
   void fill(Index frame, Values<double>& out) override {
@@ -41,9 +43,11 @@ class FileFrames final : public FrameSource {
     out = std::move(set.points);
     if (const PointArray* moved = displacement_of(set); displaced_ && moved != nullptr && out == first_)
       out += moved->values.leftCols(out.cols());
+    arrays_ = std::move(set.arrays);
   }
   std::vector<fs::path> files_;
   Points first_;
+  std::vector<PointArray> arrays_;
   bool displaced_;
 };
 
@@ -137,7 +141,7 @@ std::unique_ptr<FrameSource> open_frame_files(const std::string& name, std::vect
   PointSet first = read_points(files.front());
   const bool displaced =
       displacement_of(first) != nullptr && (files.size() == 1 || read_points(files.back()).points == first.points);
-  return std::make_unique<FileFrames>(name, std::move(files), std::move(first.points), displaced);
+  return std::make_unique<FileFrames>(name, std::move(files), std::move(first), displaced);
 }
 
 std::unique_ptr<FrameSource> open_frames(const std::string& spec) {

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 
-#include "framework/types.hpp"
+#include "framework/io/point_set.hpp"
 
 namespace halfgrad {
 
@@ -20,6 +21,10 @@ class FrameSource {
 
   /// The file that holds a frame.
   virtual std::string frame_name(Index) const { return name_; }
+
+  /// Further point data in the file of the frame that was read last, the first frame's before any was read; none of
+  /// formats that hold positions only.
+  virtual std::span<const PointArray> arrays() const { return {}; }
 
   /// Reads a frame into `out`, resized to #vertices × #columns. Throws Error on a frame out of range, on another number
   /// of vertices than the first frame's and on non-finite values; the message names the file, the frame and the vertex.

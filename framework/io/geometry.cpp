@@ -1,6 +1,8 @@
 #include "framework/io/geometry.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
 
@@ -92,6 +94,19 @@ const PointArray* find_array(std::span<const PointArray> arrays, std::string_vie
   return found == arrays.end() ? nullptr : &*found;
 }
 
+const PointArray* find_array_like(std::span<const PointArray> arrays, std::span<const std::string_view> names) {
+  const auto plain = [](std::string_view name) {
+    std::string letters;
+    for (char c : name)
+      if (c != ' ' && c != '_') letters += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return letters;
+  };
+  for (const PointArray& array : arrays)
+    for (std::string_view name : names)
+      if (plain(array.name) == plain(name)) return &array;
+  return nullptr;
+}
+
 const CellType* find_cell_type(int vtk_id) {
   static const std::vector<CellType> types = cell_types();
   const auto found =
@@ -173,15 +188,25 @@ Mesh build_mesh(Geometry geometry, const std::filesystem::path& path) {
 
 PointSet build_point_set(Geometry geometry) {
   PointSet set;
+  const bool has_corner_uv = geometry.corner_uv.rows() > 0;
+  std::vector<double> uv;
   for (Index c = 0; c < geometry.cells.num_rows(); ++c) {
     const int id = geometry.vtk_ids[c];
     if (find_cell_type(id)->dim != 2 || id == 6) continue;  // strips are no polygons
     const auto nodes = geometry.cells[c];
     set.faces.entries.insert(set.faces.entries.end(), nodes.begin(), nodes.end());
+    if (has_corner_uv)
+      for (Offset corner = geometry.cells.offsets[c]; corner < geometry.cells.offsets[c + 1]; ++corner)
+        uv.insert(uv.end(), {geometry.corner_uv(corner, 0), geometry.corner_uv(corner, 1)});
     set.faces.offsets.push_back(static_cast<Offset>(set.faces.entries.size()));
   }
   set.points = std::move(geometry.vertices);
   set.arrays = std::move(geometry.arrays);
+  constexpr std::array<std::string_view, 4> names = {"uv", "TCoords", "Texture Coordinates", "TEXCOORD_0"};
+  if (has_corner_uv)
+    set.corner_uv = Eigen::Map<const Points>(uv.data(), static_cast<Eigen::Index>(uv.size() / 2), 2);
+  else if (const PointArray* array = find_array_like(set.arrays, names); array != nullptr && array->values.cols() >= 2)
+    set.corner_uv = array->values(set.faces.entries, Eigen::seqN(0, 2));
   set.obj_text = std::move(geometry.obj_text);
   return set;
 }

@@ -30,6 +30,7 @@ struct Geometry {
   std::vector<int> vtk_ids;  ///< #cells
   IndexTable cells;          ///< #cells rows of vertex numbers
   std::vector<PointArray> arrays;
+  Points corner_uv = Points(0, 2);  ///< of each entry of `cells`, NaN where there is none; or no rows
   std::string obj_text;
 
   /// Appends a cell. Numbers out of range are left to check().

@@ -141,6 +141,7 @@ class GmshReader {
   }
 
   std::int64_t vertex_of(std::int64_t tag) {
+    if (tags_.empty()) fail("found an element, expected a section $Nodes before");
     // Most files number their nodes from 1 without gaps.
     if (tag >= 1 && static_cast<std::size_t>(tag) <= tags_.size() && tags_[static_cast<std::size_t>(tag - 1)] == tag)
       return tag - 1;

@@ -5,16 +5,38 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <vector>
 
 #include "framework/error.hpp"
+#include "framework/json_reader.hpp"
 
 namespace halfgrad {
 
+namespace {
+
+// " (did you mean …?)" where a file of almost this name stands beside it, else nothing.
+std::string similar_name(const std::filesystem::path& path) {
+  std::error_code reason;
+  std::vector<std::string> names;
+  const std::filesystem::path folder = path.parent_path();
+  for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, reason))
+    names.push_back(entry.path().filename().string());
+  std::sort(names.begin(), names.end());
+  const std::string nearest = nearest_name(path.filename().string(), {names.begin(), names.end()});
+  return nearest.empty() ? "" : fmt::format(" (did you mean {}?)", (folder / nearest).string());
+}
+
+}  // namespace
+
 InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) raise("{}: cannot be read: {}", path.string(), std::strerror(errno));
+  if (descriptor < 0) {
+    const int reason = errno;
+    raise("{}: cannot be read: {}{}", path.string(), std::strerror(reason), reason == ENOENT ? similar_name(path) : "");
+  }
   struct stat status {};
   if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     ::close(descriptor);

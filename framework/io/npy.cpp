@@ -1,5 +1,6 @@
 #include "framework/io/npy.hpp"
 
+#include <array>
 #include <limits>
 
 #include "framework/io/cursor.hpp"
@@ -129,17 +130,8 @@ class NpyFrames final : public FrameSource {
   NpyArray array_;
 };
 
-// A header of one size for any shape, so that the number of frames can be put in at the end.
+// Of a sequence of frames: room for three extents of any size.
 constexpr std::size_t header_size = 128;
-std::string npy_header(bool is_double, const std::vector<std::int64_t>& shape) {
-  std::string text =
-      fmt::format("{{'descr': '{}f{}', 'fortran_order': False, 'shape': ({}), }}",
-                  std::endian::native == std::endian::little ? '<' : '>', is_double ? 8 : 4, fmt::join(shape, ", "));
-  text.resize(header_size - 11, ' ');
-  text += '\n';
-  const std::size_t size = text.size();
-  return std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(size & 255) + static_cast<char>(size >> 8) + text;
-}
 
 template <class Scalar>
 std::string_view bytes_of(const Values<Scalar>& values) {
@@ -155,9 +147,13 @@ class NpySink final : public FrameSink {
 
   Index num_resumable() const override { return file_.num_resumable(); }
   void resume(Index num_frames) override { file_.resume(num_frames); }
-  void finish() override { file_.finish(npy_header(is_double_, {file_.num_frames(), rows_, columns_})); }
+  void finish() override { file_.finish(header(file_.num_frames())); }
 
  private:
+  std::string header(std::int64_t num_frames) const {
+    return npy_header(is_double_ ? npy_type<double>() : npy_type<float>(), std::array{num_frames, rows_, columns_});
+  }
+
   template <class Scalar>
   void append(const Values<Scalar>& points, std::span<const PointArray> arrays) {
     const std::string name = file_.path().string();
@@ -171,7 +167,7 @@ class NpySink final : public FrameSink {
     if (points.rows() != rows_ || points.cols() != columns_ || is_double != is_double_)
       raise("{}: frame {} is {} × {} of {} bytes, expected {} × {} of {} as the first", name, file_.num_frames(),
             points.rows(), points.cols(), sizeof(Scalar), rows_, columns_, is_double_ ? 8 : 4);
-    file_.append(npy_header(is_double_, {0, rows_, columns_}), bytes_of(points));
+    file_.append(header(0), bytes_of(points));
   }
 
   SeriesFile file_;
@@ -182,12 +178,22 @@ class NpySink final : public FrameSink {
 template <class Scalar>
 void write_array(const std::filesystem::path& path, const Values<Scalar>& values) {
   OutputFile file(path);
-  file.write(npy_header(sizeof(Scalar) == 8, {values.rows(), values.cols()}));
+  file.write(npy_header(npy_type<Scalar>(), std::array<std::int64_t, 2>{values.rows(), values.cols()}));
   file.write(bytes_of(values));
   file.commit();
 }
 
 }  // namespace
+
+std::string npy_header(std::string_view type, std::span<const std::int64_t> shape) {
+  std::string text = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}{}), }}", type,
+                                 fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
+  // Ten bytes stand before the text, a line's end behind it; NumPy asks for a multiple of 64 bytes in all.
+  text.resize(std::max(header_size, (text.size() + 11 + 63) / 64 * 64) - 11, ' ');
+  text += '\n';
+  return std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(text.size() & 255) +
+         static_cast<char>(text.size() >> 8) + text;
+}
 
 void write_npy(const std::filesystem::path& path, const Values<double>& values) { write_array(path, values); }
 void write_npy(const std::filesystem::path& path, const Values<float>& values) { write_array(path, values); }
@@ -197,6 +203,8 @@ Values<double> read_npy(const std::filesystem::path& path) {
   const NpyArray array = parse_npy(file);
   if (array.shape.size() != 2)
     raise("{}: found an array of shape ({}), expected #rows × #columns", path.string(), fmt::join(array.shape, ", "));
+  // An array without columns may claim any number of rows.
+  check_shape(file, array, 1, std::numeric_limits<Index>::max(), "#rows × #columns with values");
   Values<double> values(array.shape[0], array.shape[1]);
   copy_frame(array, 0, values);
   return values;

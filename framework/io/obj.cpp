@@ -1,5 +1,7 @@
 #include "framework/io/obj.hpp"
 
+#include <limits>
+
 #include "framework/io/cursor.hpp"
 #include "framework/io/frame_pattern.hpp"
 #include "framework/io/unfinished_run.hpp"
@@ -23,6 +25,17 @@ std::int64_t corner_vertex(const Cursor& in, std::string_view corner, std::int64
   const std::int64_t vertex = number > 0 ? number - 1 : num_vertices + number;
   if (vertex < 0) in.fail_at_line("a face names vertex {}, {} are known here", number, num_vertices);
   return vertex;
+}
+
+// Its texture vertex, or −1 where it names none that is known so far.
+std::int64_t corner_texture(std::string_view corner, std::int64_t num_textures) {
+  const std::size_t slash = corner.find('/');
+  if (slash == std::string_view::npos) return -1;
+  const std::string_view word = corner.substr(slash + 1);
+  std::int64_t number = 0;
+  if (!parse_integer(word.substr(0, word.find('/')), number)) return -1;
+  const std::int64_t texture = number > 0 ? number - 1 : num_textures + number;
+  return texture < num_textures ? std::max<std::int64_t>(texture, -1) : -1;
 }
 
 template <class Scalar>
@@ -123,13 +136,22 @@ Geometry read_obj(const std::filesystem::path& path) {
   const InputFile file(path);
   Cursor in(file);
   Geometry geometry;
-  std::vector<double> positions;
+  std::vector<double> positions, textures, corner_uv;
   std::vector<std::int64_t> nodes;
   while (in.remaining() > 0) {
     const auto [keyword, rest] = split_word(in.line());
-    if (keyword != "v" && keyword != "f") continue;
+    if (keyword != "v" && keyword != "f" && keyword != "vt") continue;
     std::string_view left = rest.substr(0, rest.find('#'));
-    if (keyword == "v") {
+    if (keyword == "vt") {
+      // Without a second number v is 0. What is no number at all makes no texture, and its corners none.
+      for (int a = 0; a < 2; ++a) {
+        const auto [number, after] = split_word(left);
+        double value = 0;
+        if (!number.empty() && !parse_number(number, value)) value = std::numeric_limits<double>::quiet_NaN();
+        textures.push_back(value);
+        left = after;
+      }
+    } else if (keyword == "v") {
       for (int a = 0; a < 3; ++a) {
         const auto [number, after] = split_word(left);
         double value = 0;
@@ -140,13 +162,20 @@ Geometry read_obj(const std::filesystem::path& path) {
       }
     } else {
       nodes.clear();
-      for (auto [corner, after] = split_word(left); !corner.empty(); std::tie(corner, after) = split_word(after))
+      for (auto [corner, after] = split_word(left); !corner.empty(); std::tie(corner, after) = split_word(after)) {
         nodes.push_back(corner_vertex(in, corner, static_cast<std::int64_t>(positions.size() / 3)));
+        const std::int64_t texture = corner_texture(corner, static_cast<std::int64_t>(textures.size() / 2));
+        for (int a = 0; a < 2; ++a)
+          corner_uv.push_back(texture < 0 ? std::numeric_limits<double>::quiet_NaN()
+                                          : textures[static_cast<std::size_t>(2 * texture + a)]);
+      }
       if (nodes.size() < 3) in.fail_at_line("found a face with {} corners, expected three or more", nodes.size());
       geometry.add_cell(7, nodes);
     }
   }
   geometry.vertices = Eigen::Map<const Points>(positions.data(), static_cast<Eigen::Index>(positions.size() / 3), 3);
+  if (!textures.empty())
+    geometry.corner_uv = Eigen::Map<const Points>(corner_uv.data(), static_cast<Eigen::Index>(corner_uv.size() / 2), 2);
   geometry.obj_text = std::string(file.bytes());
   return geometry;
 }

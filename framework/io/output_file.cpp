@@ -15,7 +15,12 @@ namespace halfgrad {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path) {
-  raise("{}: cannot be written: {}", path.string(), std::strerror(errno));
+  const std::string reason = std::strerror(errno);
+  std::error_code ignored;
+  const std::filesystem::path folder = path.parent_path();
+  if (!folder.empty() && !std::filesystem::exists(folder, ignored))
+    raise("{}: cannot be written: {}: make the folder {} first", path.string(), reason, folder.string());
+  raise("{}: cannot be written: {}", path.string(), reason);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "framework/io/ply.hpp"
 
+#include <array>
+
 #include "framework/io/cursor.hpp"
 
 namespace halfgrad {
@@ -40,7 +42,10 @@ class PlyReader {
     read_header();
     for (const PlyElement& element : elements_) {
       const std::int64_t count = in_.count(element.count, element.properties.empty() ? 0 : 1, element.name);
-      if (element.name == "vertex") geometry_.vertices.resize(count, 3);
+      if (element.name == "vertex") {
+        geometry_.vertices.resize(count, 3);
+        if (!texture_[0].empty()) geometry_.arrays.push_back({"uv", Values<double>(count, 2)});
+      }
       if (element.properties.empty()) continue;
       for (std::int64_t row = 0; row < count; ++row) read_row(element, row);
     }
@@ -93,10 +98,15 @@ class PlyReader {
     const auto vertex =
         std::find_if(elements_.begin(), elements_.end(), [](const auto& e) { return e.name == "vertex"; });
     if (vertex == elements_.end()) in_.fail_at_line("found no element vertex");
+    const auto has = [&](std::string_view name) {
+      return std::any_of(vertex->properties.begin(), vertex->properties.end(),
+                         [&](const Property& p) { return p.name == name && p.count_type.empty(); });
+    };
     for (std::string_view name : {"x", "y", "z"})
-      if (std::none_of(vertex->properties.begin(), vertex->properties.end(),
-                       [&](const Property& p) { return p.name == name && p.count_type.empty(); }))
-        in_.fail_at_line("the element vertex has no property {}", name);
+      if (!has(name)) in_.fail_at_line("the element vertex has no property {}", name);
+    // Names of texture coordinates as Blender, MeshLab and others write them.
+    for (const auto& names : {std::array{"s", "t"}, std::array{"u", "v"}, std::array{"texture_u", "texture_v"}})
+      if (texture_[0].empty() && has(names[0]) && has(names[1])) texture_ = {names[0], names[1]};
   }
 
   double number(const std::string& type, std::string_view what) {
@@ -120,6 +130,8 @@ class PlyReader {
         const double value = number(property.type, property.name);
         if (element.name == "vertex" && property.name.size() == 1 && property.name[0] >= 'x' && property.name[0] <= 'z')
           geometry_.vertices(row, property.name[0] - 'x') = value;
+        for (int a = 0; a < 2; ++a)
+          if (element.name == "vertex" && property.name == texture_[a]) geometry_.arrays.front().values(row, a) = value;
         continue;
       }
       const std::int64_t length = in_.count(whole(property.count_type, "the length of a list"), 1, "entries of a list");
@@ -140,6 +152,7 @@ class PlyReader {
   std::vector<PlyElement> elements_;
   Geometry geometry_;
   std::vector<std::int64_t> nodes_;
+  std::array<std::string, 2> texture_;  // names of the vertices' texture coordinates, or empty
 };
 
 }  // namespace

@@ -19,13 +19,18 @@ struct PointArray {
 
 /// The array of this name, or null.
 const PointArray* find_array(std::span<const PointArray> arrays, std::string_view name);
+/// The first array whose name is one of these but for case, spaces and underscores, or null.
+const PointArray* find_array_like(std::span<const PointArray> arrays, std::span<const std::string_view> names);
 
 /// Points of a file, in its order and count.
 struct PointSet {
   Points points;                   ///< #points × 2 or 3
   IndexTable faces;                ///< polygons by point number; no rows where the file has none
-  std::vector<PointArray> arrays;  ///< the point data of a VTK file
-  std::string obj_text;            ///< the whole text of an OBJ file, which OBJ output repeats but for its "v" lines
+  std::vector<PointArray> arrays;  ///< the point data of a VTK file; of PLY texture coordinates as "uv"
+  /// Texture coordinates of each entry of `faces`, v upwards: #corners × 2, NaN where a corner has none; no rows where
+  /// the file has none. Of OBJ "vt"; else the point data "uv", "TCoords", "Texture Coordinates" or "TEXCOORD_0".
+  Points corner_uv = Points(0, 2);
+  std::string obj_text;  ///< the whole text of an OBJ file, which OBJ output repeats but for its "v" lines
 };
 
 /// Reads .obj, .ply, .stl (three points a facet, in file order), .vtk, .vtp, .vtu, .npy (#points × 2|3) and, as their

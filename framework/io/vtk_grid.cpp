@@ -116,7 +116,12 @@ Grid read_vtk_grid(const std::filesystem::path& path) {
 }
 
 Geometry read_vtk_grid_cells(const std::filesystem::path& path) {
-  const Mesh mesh = read_vtk_grid(path).mesh();
+  const Grid grid = read_vtk_grid(path);
+  // A file of a hundred bytes can name a grid of any size.
+  constexpr Index most_listed = 100'000'000;
+  if (grid.num_cells() > most_listed)
+    raise("{}: a grid of {} cells: at most {} are listed one by one", path.string(), grid.num_cells(), most_listed);
+  const Mesh mesh = grid.mesh();
   Geometry geometry;
   geometry.vertices = Points::Zero(mesh.num_vertices(), 3);
   geometry.vertices.leftCols(mesh.gdim()) = mesh.vertices();

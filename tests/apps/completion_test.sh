@@ -26,6 +26,10 @@ expect "halfgrad --th" --threads
 expect "halfgrad deform --re" --rest --reconstructor --report
 expect "halfgrad deform --rest a.msh --interpolant " linear phong hermite
 expect "halfgrad export --as st" stencils
+expect "halfgrad deform --normals " gradient smooth
+expect "halfgrad deform --normals --ta" --tangents
+expect "halfgrad bind --interpolant attr" attribute_transfer
+expect "halfgrad deform --ta" --tangents
 expect "halfgrad list re" reconstructors
 expect "halfgrad stress --element te" tetrahedron
 expect "halfgrad --quiet deform --outside n" nearest

@@ -108,6 +108,16 @@ TEST_F(Program, UsageErrorsSayWhatToTypeNext) {
   EXPECT_THAT(run_program("dance").output, AllOf(HasSubstr("dance"), HasSubstr("deform, bind, report, export")));
   EXPECT_THAT(deform("--intepolant linear").output,
               AllOf(HasSubstr("did you mean --interpolant?"), HasSubstr("halfgrad deform --help")));
+  EXPECT_THAT(run_program("--outside nearest").output,
+              AllOf(HasSubstr("halfgrad deform, halfgrad bind"), HasSubstr("halfgrad --help")));
+  EXPECT_THAT(run_program(in("rest.vtu")).output, HasSubstr("halfgrad info " + in("rest.vtu")));
+  EXPECT_THAT(run_program("info " + in("rset.vtu")).output, HasSubstr("did you mean " + in("rest.vtu")));
+  EXPECT_THAT(deform("", "none/out.%d.obj").output, AllOf(HasSubstr("out.%d.obj"), HasSubstr("make the folder")));
+  write_npy(in("points.npy"), Values<double>(surface.points));
+  EXPECT_THAT(run_program("deform --rest " + in("rest.vtu") + " --frames " + in("points.npy") + " --points " +
+                          in("points.vtp") + " --out " + in("out.npy"))
+                  .output,
+              HasSubstr("--points exchanged?"));
   EXPECT_THAT(run_program("deform --rest").output, AllOf(HasSubstr("--rest"), HasSubstr("halfgrad deform --help")));
 }
 
@@ -212,6 +222,53 @@ TEST_F(Program, NormalsTurnWithTheSurface) {
               1e-12);
   ASSERT_EQ(deform("--normals", "with.pvd").status, 0);
   EXPECT_FALSE(std::filesystem::exists(in("with.normals.npy")));
+}
+
+TEST_F(Program, TangentsComeFromTheTextureAndTurnWithTheSurface) {
+  // Texture coordinates of an OBJ by corner: u along x, v along y.
+  std::ofstream(in("points.obj"))
+      << "v 0.3 0.3 0.4\nv 0.7 0.3 0.4\nv 0.7 0.7 0.4\nv 0.3 0.7 0.5\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+         "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
+  const auto carry = [&](const std::string& points, const std::string& options, const std::string& out) {
+    return run_program("deform --rest " + in("rest.vtu") + " --frames " + in("frames.npy") + " --points " + in(points) +
+                       " --out " + in(out) + " --tangents " + options);
+  };
+  const auto tangents_of = [&](const std::string& name, Index number) {
+    Values<double> values;
+    open_npy_values(in(name))->read(number, values);
+    return values;
+  };
+  for (const char* options : {"", "--normals smooth", "--precision float"}) {
+    SCOPED_TRACE(options);
+    const Outcome outcome = carry("points.obj", options, "out.npy");
+    ASSERT_EQ(outcome.status, 0) << outcome.output;
+    const Values<double> rest = tangents_of("out.tangents.npy", 0), turned = tangents_of("out.tangents.npy", 1);
+    ASSERT_EQ(rest.cols(), 4);
+    EXPECT_LT((turned.leftCols(3) - rotated(rest.leftCols(3))).cwiseAbs().maxCoeff(), 1e-6);
+    EXPECT_EQ(rest.col(3), Eigen::Vector4d::Ones());
+    for (Index f = 0; f < 3; ++f) {
+      const Values<double> t = tangents_of("out.tangents.npy", f), n = tangents_of("out.normals.npy", f);
+      for (int p = 0; p < 4; ++p) {
+        EXPECT_NEAR(t.row(p).head<3>().norm(), 1, 1e-6);
+        EXPECT_NEAR(t.row(p).head<3>().dot(n.row(p)), 0, 1e-6);
+      }
+    }
+    EXPECT_GT(rest.col(0).minCoeff(), 0.9);  // u grows along x
+  }
+  // Of a VTK file, its own tangents come first, and the array that was read is not left beside the carried one.
+  Values<double> uv(4, 2), own(4, 4);
+  uv << 0, 0, 1, 0, 1, 1, 0, 1;
+  own << Eigen::RowVector4d(0, 1, 0, -1).replicate(4, 1);
+  write_vtp(directory / "both.vtp", surface.points, surface.faces,
+            std::vector{PointArray{"uv", uv}, PointArray{"Tangents", own}});
+  ASSERT_EQ(carry("both.vtp", "", "out.pvd").status, 0);
+  const PointSet result = read_points(in("out_0000.vtp"));
+  EXPECT_EQ(find_array(result.arrays, "Tangents"), nullptr);
+  ASSERT_NE(find_array(result.arrays, "tangents"), nullptr);
+  EXPECT_EQ(find_array(result.arrays, "tangents")->values.col(3), Eigen::Vector4d::Constant(-1));
+  EXPECT_GT(find_array(result.arrays, "tangents")->values.col(1).minCoeff(), 0.9);
+  ASSERT_NE(find_array(result.arrays, "uv"), nullptr);
+  EXPECT_THAT(carry("points.vtp", "", "none.npy").output, AllOf(HasSubstr("texture coordinates"), HasSubstr("vt")));
 }
 
 TEST_F(Program, ReportCountsAndTimes) {

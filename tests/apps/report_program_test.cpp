@@ -10,6 +10,7 @@
 #include "apps/run_program.hpp"
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
+#include "framework/io/npy.hpp"
 #include "framework/io/vtk_output.hpp"
 #include "support/test_meshes.hpp"
 
@@ -144,8 +145,28 @@ TEST_F(ReportProgram, DeformCarriesByTheBaselines) {
     points.col(1).array() += 2;
     EXPECT_LT((result - points).norm(), 1e-12) << rule;
     points.col(1).array() -= 2;
-    EXPECT_EQ(json::parse(text("report.json"))["counts"]["frames"], 1);
+    const json report = json::parse(text("report.json"));
+    EXPECT_EQ(report["counts"]["frames"], 1);
+    EXPECT_EQ(report["counts"]["points"], 2);
+    EXPECT_GT(report["counts"]["weights"], 2);
+
+    // A saved binding gives the same bytes, and refuses another rule.
+    const std::string plain = text("out.npy");
+    const Outcome bound = run_program("bind --rest " + in("rest.vtu") + " --points " + in("points.vtp") + " --out " +
+                                      in("x.hgb") + " --interpolant " + rule);
+    ASSERT_EQ(bound.status, 0) << bound.output;
+    const std::string again = "deform --binding " + in("x.hgb") + " --frames " + in("frames.npy") + " --out ";
+    ASSERT_EQ(run_program(again + in("bound.npy")).status, 0);
+    EXPECT_EQ(text("bound.npy"), plain);
+    EXPECT_EQ(run_program(again + in("bound.npy") + " --interpolant " + rule).status, 0);
+    EXPECT_THAT(run_program(again + in("no.npy") + " --interpolant phong").output, HasSubstr("bind again"));
   }
+  // Fields are weighted means, constants exact.
+  write_npy(in("heat.npy"), Values<double>(Values<double>::Constant(mesh.num_vertices(), 1, 7)));
+  ASSERT_EQ(deform("--interpolant moving_least_squares --field heat=" + in("heat.npy")).status, 0);
+  Values<double> heat;
+  open_npy_values(in("out.heat.npy"))->read(0, heat);
+  EXPECT_LT((heat.array() - 7).abs().maxCoeff(), 1e-12);
   EXPECT_EQ(deform("--interpolant attribute_transfer --gradients").status, 2);
   EXPECT_THAT(deform("--interpolant attribute_transfer --tolerance 1").output, HasSubstr("--tolerance"));
   EXPECT_THAT(deform(R"(--interpolant '{"attribute_transfer": {"radus": 1}}')").output, HasSubstr("radius"));

@@ -41,6 +41,25 @@ class RestShapes : public testing::Test {
     open_frames(in(name))->read(0, values);
     return values;
   }
+  std::string content(const std::string& name) const {
+    std::ifstream file(directory / name, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  }
+  /// What deform writes by a saved binding has the same bytes as without; other points are refused.
+  void expect_same_bytes_when_bound(const std::string& rest, const std::string& options = "") {
+    SCOPED_TRACE(rest + " " + options);
+    const std::string shape = " --rest " + in(rest) + " --points " + in("points.npy") + " " + options;
+    const std::string frames = " --frames " + in("frames.npy") + " --out ";
+    ASSERT_EQ(run("deform" + shape + frames + in("plain.npy")), 0) << output;
+    ASSERT_EQ(run("bind" + shape + " --out " + in("x.hgb")), 0) << output;
+    ASSERT_EQ(run("deform --binding " + in("x.hgb") + frames + in("bound.npy")), 0) << output;
+    EXPECT_EQ(content("bound.npy"), content("plain.npy"));
+    Values<double> points = read_npy(in("points.npy"));
+    points(0, 0) += 0.001;
+    write_points("other.npy", points);
+    EXPECT_EQ(run("deform --binding " + in("x.hgb") + " --points " + in("other.npy") + frames + in("no.npy")), 2);
+    EXPECT_THAT(output, HasSubstr("bind again"));
+  }
   int run(const std::string& arguments) {
     const Outcome outcome = run_program(arguments);
     output = outcome.output;
@@ -78,6 +97,8 @@ TEST_F(RestShapes, GridsCarryPoints) {
   ASSERT_EQ(run(arguments + " --reconstructor adaptive"), 0) << output;
   ASSERT_EQ(run("info " + in("grid.vti")), 0) << output;
   EXPECT_THAT(output, HasSubstr("12 cells"));
+  for (const char* options : {"", "--interpolant linear", "--reconstructor adaptive", "--outside nearest"})
+    expect_same_bytes_when_bound("grid.vti", options);
 }
 
 TEST_F(RestShapes, SurfacesCarryPointsBesideThem) {
@@ -96,6 +117,10 @@ TEST_F(RestShapes, SurfacesCarryPointsBesideThem) {
     EXPECT_THAT(output, HasSubstr("from the surface"));
     EXPECT_LT((read_array("out.npy") - points * turn.transpose()).cwiseAbs().maxCoeff(), 1e-6) << options;
   }
+  for (const char* options : {"", "--interpolant linear", "--reconstructor kriging"})
+    expect_same_bytes_when_bound("cloth.obj", options);
+  // A baseline asks for no cells, so it takes a surface as it takes a mesh.
+  expect_same_bytes_when_bound("cloth.obj", "--interpolant attribute_transfer");
   write_array("flat.npy", rest.leftCols(2));
   EXPECT_EQ(run(arguments + in("flat.npy")), 2);
   EXPECT_THAT(output, HasSubstr("surface in space"));

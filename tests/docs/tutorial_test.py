@@ -19,7 +19,7 @@ except ImportError as missing:
     print(f"skipped: {missing}; install python3-meshio")
     sys.exit(77)
 
-program, root = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+program, root = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
 blocks = re.findall(r"^```(\w*)\n(.*?)^```$", (root / "docs" / "tutorial.md").read_text(), re.M | re.S)
 environment = dict(os.environ, HALFGRAD=str(root), PATH=f"{program.parent}:{os.environ['PATH']}")
 printed = ""

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "framework/error.hpp"
+#include "framework/mesh_faults.hpp"
 #include "support/message_of.hpp"
 
 namespace halfgrad {
@@ -87,6 +88,40 @@ TEST(Mesh, InspectFindsWhatIsWrong) {
   EXPECT_THAT(bad.degenerate_cells, ElementsAre(0));
   EXPECT_THAT(bad.inverted_cells, ElementsAre(1));
   EXPECT_TRUE(bad.folded_cells.empty());
+}
+
+TEST(Mesh, InspectFindsWhatIsThereTwice) {
+  // Two squares whose common edge has vertices of its own on each side, one of which has a coordinate −0, and a cell
+  // that is listed again from another node on.
+  Points vertices(8, 2);
+  vertices << -1, 0, 0, 0, 0, 1, -1, 1, -0.0, 0, 1, 0, 1, 1, 0, 1;
+  ElementBlock<Quadrilateral> quads;
+  quads.cells.resize(3, 4);
+  quads.cells << 0, 1, 2, 3, 4, 5, 6, 7, 2, 3, 0, 1;
+  const Mesh mesh(vertices, {quads});
+  EXPECT_THAT(duplicate_vertices(mesh), ElementsAre(4, 7));
+  EXPECT_THAT(duplicate_cells(mesh), ElementsAre(2));
+  EXPECT_TRUE(nonmanifold_facets(mesh).empty());
+  EXPECT_TRUE(duplicate_cells(square_of_triangles()).empty());
+  EXPECT_TRUE(duplicate_vertices(square_of_triangles()).empty());
+
+  // A triangle is no quadrilateral, whatever their first vertices.
+  ElementBlock<Triangle> triangles;
+  triangles.cells.resize(1, 3);
+  triangles.cells << 0, 1, 2;
+  EXPECT_THAT(duplicate_cells(Mesh(vertices, {triangles, quads})), ElementsAre(3));
+}
+
+TEST(Mesh, InspectNamesFacetsOfThreeCells) {
+  Points vertices(5, 2);
+  vertices << 0, 0, 1, 0, 0, 1, 1, 1, 0.5, -1;
+  ElementBlock<Triangle> fan;
+  fan.cells.resize(3, 3);
+  fan.cells << 0, 1, 2, 1, 0, 4, 3, 0, 1;
+  const Mesh mesh(vertices, {fan});
+  constexpr Index none = std::numeric_limits<Index>::max();
+  EXPECT_THAT(nonmanifold_facets(mesh), ElementsAre(FacetKey{0, 1, none, none}));
+  EXPECT_EQ(inspect(mesh).num_nonmanifold_facets, 1);
 }
 
 TEST(Mesh, InspectFindsFoldedQuadrilaterals) {

@@ -143,6 +143,27 @@ def main(folder):
                 assert np.abs(moved - expected).max() < 1e-12, (scene, options)
         assert "transforms" not in json.loads(exported(scene, "bones.json").read_text())["arrays"]
 
+    # A grid without cells of its own, mapped by centered differences.
+    planes = [np.linspace(0, 1.5, 4), np.linspace(0, 2, 3), np.linspace(0, 2, 3)]
+    rest = np.array([[x, y, z] for z in planes[2] for y in planes[1] for x in planes[0]])
+    (folder / "grid.vti").write_text(
+        '<VTKFile type="ImageData"><ImageData WholeExtent="0 3 0 2 0 2" Origin="0 0 0" Spacing="0.5 1 1">'
+        '<Piece Extent="0 3 0 2 0 2"/></ImageData></VTKFile>')
+    np.save(folder / "grid.npy", np.stack([rest + t * rest[:, [1, 2, 0]] ** 2 for t in (0, 0.3)]))
+    np.save(folder / "grid.points.npy", np.random.default_rng(2).uniform(0, 1.5, (200, 3)))
+    common = ["--rest", folder / "grid.vti", "--points", folder / "grid.points.npy", "--quiet"]
+    run("deform", *common, "--frames", folder / "grid.npy", "--out", out)
+    run("export", *common, "--reconstructor", "centered_difference", "--out", folder / "grid.npz")
+    matrix = scipy.sparse.load_npz(folder / "grid.npz")
+    moved = np.stack([matrix @ frame for frame in np.load(folder / "grid.npy")])
+    assert np.abs(moved - np.load(out)).max() < 1e-12
+    run("export", *common, "--frames", folder / "grid.npy", "--out", folder / "grid.json")
+    array = {name: np.load(folder / entry["file"])
+             for name, entry in json.loads((folder / "grid.json").read_text())["arrays"].items()}
+    points = np.column_stack([array["points"], np.ones(len(array["points"]))])
+    moved = np.einsum("pk,fpkij,pj->fpi", array["weights"], array["transforms"][:, array["indices"]], points)
+    assert np.abs(moved - np.load(out)).max() < 1e-12
+
     # Points outside: extrapolated ones have their weights, marked ones none.
     outside = np.array([[0.5, 0.5, 0.5], [1.3, 0.5, 0.4]])
     np.save(folder / "tetrahedra.points.npy", outside)

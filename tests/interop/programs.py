@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 """Tries halfgrad with the programs it exchanges files with, as Debian 12 packages them.
 
-    programs.py PROGRAM [--require] [numpy|vtk|meshio|gmsh|tetgen|calculix|dolfinx|blender]...
+    programs.py PROGRAM [--require] [numpy|vtk|meshio|gmsh|tetgen|opensubdiv|calculix|dolfinx|blender]...
 
-Without names, those that are quick: numpy, vtk, meshio, gmsh, tetgen. A program that is not installed is skipped, with --require
+Without names, those that are quick: numpy, vtk, meshio, gmsh, tetgen, opensubdiv. A program that is not installed is skipped, with --require
 it is a failure. Leaves with status 77 (ctest: skipped) where all were skipped. docs/interoperation.md has the results.
 """
 import importlib.util
@@ -262,6 +262,37 @@ print(dolfinx.__version__)
     return f"DOLFINx {version}: .pvd of displacements as frames, its first .vtu as rest mesh; a quadratic motion to {error:.1e}"
 
 
+def try_opensubdiv(folder):
+    need_program("c++", "g++")
+    if not pathlib.Path("/usr/include/opensubdiv/far/stencilTable.h").exists():
+        raise Missing("libosd-dev")
+    call("c++", "-std=c++17", "-O1", pathlib.Path(__file__).parent / "opensubdiv_stencils.cpp", "-o", folder / "stencils", "-losdCPU")
+    scene(folder)
+    frames = np.load(folder / "frames.npy")
+    worst = {"double": 0, "float": 0}
+    for rule in ("linear", "phong", "hermite", "dual_taylor"):
+        # The map's own reconstructor is kriging, with cubic drift for dual_taylor.
+        given = [] if rule == "dual_taylor" else ["--reconstructor", "kriging"]
+        halfgrad("deform", "--rest", BALL, "--frames", folder / "frames.npy", "--points", folder / "sphere.obj", "--out",
+                 folder / "expected.npy", "--interpolant", rule, *given)
+        halfgrad("export", "--rest", BALL, "--points", folder / "sphere.obj", "--out", folder / "map.npz", "--as", "stencils",
+                 "--interpolant", rule)
+        stencils = np.load(folder / "map.npz")
+        for name in ("sizes", "offsets", "indices", "weights"):
+            stencils[name].tofile(folder / f"{name}.bin")
+        (folder / "counts.txt").write_text(str(stencils["num_control_vertices"]))
+        for frame, expected in zip(frames, np.load(folder / "expected.npy")):
+            frame.tofile(folder / "frame.bin")
+            version = call(folder / "stencils", folder).strip()
+            for precision, kind in (("double", np.float64), ("float", np.float32)):
+                moved = np.fromfile(folder / f"{precision}.bin", kind).reshape(-1, 3)
+                worst[precision] = max(worst[precision], np.abs(moved - expected).max())
+    # Some hundred products of numbers near one.
+    assert worst["double"] < 1e-14 and worst["float"] < 2e-6, worst
+    return (f"{version}: stencils in a Far::StencilTable give deform's points of four rules to {worst['double']:.1e}, "
+            f"by Osd::CpuEvaluator in single precision to {worst['float']:.1e}")
+
+
 def try_blender(folder):
     need_program("blender", "blender")
     out, _, faces = scene(folder)
@@ -292,12 +323,54 @@ np.save(folder + "/blender.npy", frames)
     difference = np.abs(np.load(folder / "blender.npy") - out).max()
     assert difference < 1e-6, difference
     version = call("blender", "--version").split("\n")[0]
-    return f"{version}: the Mesh Cache modifier shows the frames of .pc2 to {difference:.1e}"
+    worst, swapped = blender_tangents(folder)
+    assert worst < 1 and swapped == 0, (worst, swapped)
+    return (f"{version}: the Mesh Cache modifier shows the frames of .pc2 to {difference:.1e}; its tangents (MikkTSpace) and deform's "
+            f"differ by {worst:.1f} degrees at most, in no sign")
+
+
+def blender_tangents(folder):
+    """Tangents of a wavy sheet whose texture is mirrored at x = 0: the greatest angle between Blender's and deform's, which are
+    means over other weights, and the number of points where the handedness differs; but for points at the mirror."""
+    n, half = 60, 0.3
+    x, y = np.meshgrid(np.linspace(-half, half, n + 1), np.linspace(-half, half, n + 1))
+    points = np.column_stack([x.ravel(), y.ravel(), 0.1 * np.sin(5 * x.ravel()) * np.cos(4 * y.ravel())])
+    uv = np.column_stack([np.abs(points[:, 0]) + 0.3 * points[:, 1] ** 2, points[:, 1]])
+    faces = [[v, v + 1, v + n + 2, v + n + 1] for j in range(n) for v in range(j * (n + 1), j * (n + 1) + n)]
+    (folder / "sheet.obj").write_text(
+        "".join(f"v {a!r} {b!r} {c!r}\n" for a, b, c in points.tolist()) + "".join(f"vt {a!r} {b!r}\n" for a, b in uv.tolist())
+        + "".join("f " + " ".join(f"{v + 1}/{v + 1}" for v in face) + "\n" for face in faces))
+    halfgrad("deform", "--rest", BALL, "--frames", folder / "frames.npy", "--last", "0", "--points", folder / "sheet.obj", "--out",
+             folder / "sheet.npy", "--tangents")
+    ours = np.load(folder / "sheet.tangents.npy")[0]
+    np.savez(folder / "sheet.npz", points=points, uv=uv, faces=faces)
+    (folder / "tangents.py").write_text("""
+import bpy, sys
+import numpy as np
+folder = sys.argv[-1]
+sheet = np.load(folder + "/sheet.npz")
+mesh = bpy.data.meshes.new("sheet")
+mesh.from_pydata(sheet["points"].tolist(), [], sheet["faces"].tolist())
+layer = mesh.uv_layers.new(name="uv")
+for loop in mesh.loops:
+    layer.data[loop.index].uv = sheet["uv"][loop.vertex_index]
+for polygon in mesh.polygons:
+    polygon.use_smooth = True
+mesh.calc_tangents(uvmap="uv")
+np.save(folder + "/tangents.npy", [[loop.vertex_index, *loop.tangent, loop.bitangent_sign] for loop in mesh.loops])
+""")
+    call("blender", "-b", "--factory-startup", "--python-exit-code", "1", "-P", folder / "tangents.py", "--", folder)
+    theirs = np.load(folder / "tangents.npy")
+    corners = theirs[:, 0].astype(int)
+    away = np.abs(points[corners, 0]) > 1e-9
+    theirs, ours = theirs[away, 1:], ours[corners[away]]
+    angle = np.degrees(2 * np.arcsin(np.linalg.norm(theirs[:, :3] - ours[:, :3], axis=1) / 2))
+    return angle.max(), int(np.sum(theirs[:, 3] != ours[:, 3]))
 
 
 def main(names):
     required = "--require" in names
-    names = [name for name in names if name != "--require"] or ["numpy", "vtk", "meshio", "gmsh", "tetgen"]
+    names = [name for name in names if name != "--require"] or ["numpy", "vtk", "meshio", "gmsh", "tetgen", "opensubdiv"]
     results = []
     for name in names:
         with tempfile.TemporaryDirectory() as folder:

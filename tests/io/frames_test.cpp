@@ -216,7 +216,8 @@ TEST_F(Frames, FieldsComeFromArraysFrameFilesOrTheRestMesh) {
   const auto frames = open_frames(file("x*.vtp").string());
   const auto values = [&](const std::string& spec, Index frame) {
     FieldSource field(spec, file("rest.vtp"), *frames);
-    Values<double> result;
+    Values<double> result, positions;
+    frames->read(frame, positions);
     field.read(frame, result);
     return result;
   };

@@ -42,6 +42,33 @@ TEST_F(PointFiles, ObjKeepsOrderAndUnusedVertices) {
   EXPECT_THAT(message_of([&] { read_points(file("b.obj", "v 1 2 1e999\n")); }), HasSubstr("inf"));
 }
 
+TEST_F(PointFiles, TextureCoordinatesStandAtTheCornersOfFaces) {
+  const PointSet obj = read_points(
+      file("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0.5 0.25\nvt 1 0 0\nf 1/1 2/2/7 3\nvt 0 1\nf 1/-1 2/9 3//2\n"));
+  ASSERT_EQ(obj.corner_uv.rows(), 6);
+  EXPECT_EQ(obj.corner_uv.row(0), Eigen::RowVector2d(0.5, 0.25));
+  EXPECT_EQ(obj.corner_uv.row(1), Eigen::RowVector2d(1, 0));
+  EXPECT_EQ(obj.corner_uv.row(3), Eigen::RowVector2d(0, 1));
+  // None given, none that the file has, none but a normal.
+  for (int corner : {2, 4, 5}) EXPECT_FALSE(obj.corner_uv.row(corner).allFinite()) << corner;
+  EXPECT_EQ(read_points(file("b.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n")).corner_uv.rows(), 0);
+
+  for (const char* names : {"s t", "u v", "texture_u texture_v"}) {
+    const std::string u(names, std::string_view(names).find(' ')), v(names + u.size() + 1);
+    const PointSet ply = read_points(
+        file("a.ply",
+             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+             "property float " +
+                 u + "\nproperty float " + v +
+                 "\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+                 "0 0 0 0.5 0.25\n1 0 0 1 0\n1 1 0 1 1\n3 2 0 1\n"));
+    Points expected(3, 2);
+    expected << 1, 1, 0.5, 0.25, 1, 0;
+    EXPECT_EQ(ply.corner_uv, expected) << names;
+    ASSERT_NE(find_array(ply.arrays, "uv"), nullptr);
+  }
+}
+
 TEST_F(PointFiles, PlyOfAllCodingsAgree) {
   const std::string header =
       "\ncomment x\nelement vertex 3\nproperty uchar red\nproperty double x\nproperty float y\nproperty short z\n"

@@ -1,0 +1,176 @@
+// Files that a fuzzer or an enemy makes: refused in words, in time and memory that the file's size bounds.
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "framework/io/binding_file.hpp"
+#include "framework/io/mesh_file.hpp"
+#include "framework/io/npy.hpp"
+#include "framework/io/point_set.hpp"
+#include "framework/json_values.hpp"
+#include "io/io_support.hpp"
+
+namespace halfgrad {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class HostileFiles : public FileTest {};
+
+// Of two triangles that make a square.
+constexpr BindingSizes square{.gdim = 2, .num_vertices = 4, .num_cells = 2, .num_points = 4};
+
+// Four points in it, one of them outside and one not found, with a stencil for every vertex.
+SavedBinding whole_binding() {
+  SavedBinding binding{"{}", "print", {}, Reconstruction{}};
+  Embedding& embedding = std::get<Embedding>(binding.places);
+  embedding.gdim = 2;
+  embedding.cells = {0, 1, 1, -1};
+  embedding.local = Points::Constant(4, 2, 0.25);
+  embedding.status = {PointStatus::inside, PointStatus::boundary, PointStatus::outside, PointStatus::not_found};
+  embedding.outside = {{2, 0.5, Vector::Zero(2)}, {3, 1.5, Vector::Zero(2)}};
+  GradientStencilTable& table = binding.reconstruction->stencils;
+  table.gdim = 2;
+  table.vertices = {0, 1, 2, 3};
+  table.offsets = {0, 1, 2, 3, 4};
+  table.neighbors = {1, 2, 3, 0};
+  table.weights.assign(8, 1.0);
+  table.diagnostics.assign(4, {StencilRule::full_fit});
+  return binding;
+}
+
+TEST_F(HostileFiles, BindingsWhoseTablesContradictEachOtherAreRefused) {
+  const auto message = [&](auto&& damage) {
+    SavedBinding binding = whole_binding();
+    damage(binding);
+    write_binding(file("a.hgb"), binding);
+    return message_of([&] { read_binding(file("a.hgb"), square, "print"); });
+  };
+  EXPECT_EQ(message([](SavedBinding&) {}), "no error");
+  using S = SavedBinding;
+  const auto places = [](S& b) -> Embedding& { return std::get<Embedding>(b.places); };
+  EXPECT_THAT(message([&](S& b) { places(b).cells[0] = -1; }), AllOf(HasSubstr("a.hgb"), HasSubstr("point 0")));
+  EXPECT_THAT(message([&](S& b) { places(b).cells[3] = 0; }), HasSubstr("point 3"));
+  EXPECT_THAT(message([&](S& b) { places(b).cells[1] = 2; }), HasSubstr("\"cells\" holds 2"));
+  EXPECT_THAT(message([&](S& b) { places(b).local(1, 0) = std::nan(""); }), HasSubstr("\"local\""));
+  EXPECT_THAT(message([&](S& b) { places(b).outside[0].distance = std::nan(""); }), HasSubstr("distances"));
+  EXPECT_THAT(message([&](S& b) { places(b).outside[0].point = 1; }), HasSubstr("\"outside_points\""));
+  EXPECT_THAT(message([&](S& b) { std::swap(places(b).outside[0], places(b).outside[1]); }),
+              HasSubstr("\"outside_points\""));
+  EXPECT_THAT(message([&](S& b) { places(b).outside.pop_back(); }), HasSubstr("\"outside_points\""));
+  EXPECT_THAT(message([](S& b) { b.reconstruction->stencils.diagnostics.pop_back(); }),
+              AllOf(HasSubstr("\"rules\""), HasSubstr("3 entries")));
+  EXPECT_THAT(message([](S& b) { b.reconstruction->stencils.weights.pop_back(); }), HasSubstr("\"weights\""));
+  EXPECT_THAT(message([](S& b) { b.reconstruction->stencils.offsets[1] = 3; }), HasSubstr("\"offsets\""));
+  EXPECT_THAT(message([](S& b) { b.reconstruction->stencils.neighbors[0] = 4; }), HasSubstr("\"neighbors\" holds 4"));
+}
+
+TEST_F(HostileFiles, FeetAndWeightsThatContradictTheirSizesAreRefused) {
+  // Every point by the three vertices of a cell.
+  SurfaceEmbedding feet;
+  feet.feet.gdim = 2;
+  feet.feet.num_vertices = 4;
+  feet.feet.offsets = {0, 3, 6, 9, 12};
+  feet.feet.vertices = {0, 1, 2, 0, 1, 2, 0, 2, 3, 0, 2, 3};
+  feet.feet.weights.assign(12, 1.0 / 3);
+  feet.feet.arms.assign(24, 0.25);
+  feet.cells = {0, 0, 1, 1};
+  feet.distance = {0, 0.5, -0.5, 0};
+  const auto of_feet = [&](auto&& damage) {
+    SurfaceEmbedding damaged = feet;
+    damage(damaged);
+    write_binding(file("a.hgb"), {"{}", "print", damaged, {}});
+    return message_of([&] { read_binding(file("a.hgb"), square, "print"); });
+  };
+  using F = SurfaceEmbedding;
+  EXPECT_EQ(of_feet([](F&) {}), "no error");
+  const SavedBinding read = read_binding(file("a.hgb"), square, "print");
+  EXPECT_EQ(std::get<F>(read.places).feet.arms, feet.feet.arms);
+  EXPECT_EQ(std::get<F>(read.places).distance, feet.distance);
+  EXPECT_THAT(of_feet([](F& f) { f.cells[1] = 2; }), HasSubstr("\"cells\" holds 2"));
+  EXPECT_THAT(of_feet([](F& f) { f.cells[1] = -1; }), HasSubstr("\"cells\" holds -1"));
+  EXPECT_THAT(of_feet([](F& f) { f.feet.vertices[0] = 4; }), HasSubstr("\"vertices\" holds 4"));
+  EXPECT_THAT(of_feet([](F& f) { f.feet.offsets[1] = 13; }), HasSubstr("\"offsets\""));
+  EXPECT_THAT(of_feet([](F& f) { f.feet.arms.pop_back(); }), HasSubstr("\"arms\""));
+  EXPECT_THAT(of_feet([](F& f) { f.feet.weights[3] = std::nan(""); }), HasSubstr("\"weights\""));
+  EXPECT_THAT(of_feet([](F& f) { f.distance.pop_back(); }), HasSubstr("\"distance\""));
+
+  using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+  const auto of_weights = [&](Weights weights) {
+    weights.makeCompressed();
+    write_binding(file("a.hgb"), {"{}", "print", weights, {}});
+    return message_of([&] { read_binding(file("a.hgb"), square, "print"); });
+  };
+  Weights weights(4, 4);
+  for (int p = 0; p < 4; ++p) weights.insert(p, p) = 1;
+  EXPECT_EQ(of_weights(weights), "no error");
+  EXPECT_EQ(std::get<Weights>(read_binding(file("a.hgb"), square, "print").places).toDense(), weights.toDense());
+  Weights wider(4, 5);
+  wider.insert(0, 4) = 1;
+  EXPECT_THAT(of_weights(wider), HasSubstr("\"vertices\" holds 4"));
+  EXPECT_THAT(of_weights(Weights(3, 4)), HasSubstr("\"offsets\""));
+}
+
+TEST_F(HostileFiles, BindingsAreWhatTheWriterWritesAndNothingElse) {
+  const auto message = [&](const std::string& bytes) {
+    file("b.hgb", bytes);
+    return message_of([&] { read_binding(file("b.hgb"), square, "print"); });
+  };
+  // CBOR: an array of 2^62 entries, a hundred thousand nested arrays, as many nested objects.
+  EXPECT_THAT(message("\x9b\x40" + std::string(7, '\0')), AllOf(HasSubstr("b.hgb"), HasSubstr("no binding")));
+  EXPECT_THAT(message(std::string(100'000, '\x81')), HasSubstr("no binding"));
+  std::string objects;
+  for (int i = 0; i < 100'000; ++i) objects += "\xa1\x61x";
+  EXPECT_THAT(message(objects), HasSubstr("no binding"));
+  EXPECT_THAT(message("\x01"), HasSubstr("no binding"));
+  // A version that is a text and no UTF-8.
+  EXPECT_THAT(message("\xa1\x70halfgrad_binding\x61\xff"), HasSubstr("version"));
+}
+
+TEST_F(HostileFiles, ElementsBeforeTheirNodesAreRefused) {
+  EXPECT_THAT(
+      message_of([&] {
+        read_mesh(file("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Elements\n1\n1 15 0 1\n$EndElements\n"));
+      }),
+      AllOf(HasSubstr("a.msh:6"), HasSubstr("$Nodes before")));
+}
+
+TEST_F(HostileFiles, ArraysWithoutColumnsHaveNoRows) {
+  std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000000000, 0), }";
+  header.resize(118, ' ');
+  file("a.npy", std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header);
+  EXPECT_THAT(message_of([&] { read_npy(file("a.npy")); }),
+              AllOf(HasSubstr("a.npy"), HasSubstr("(1000000000000000000, 0)")));
+}
+
+TEST_F(HostileFiles, DeeplyNestedJsonIsRefused) {
+  EXPECT_THAT(message_of([] { parse_json(std::string(100'000, '['), "x.json"); }),
+              AllOf(HasSubstr("x.json"), HasSubstr("nested deeper than 100")));
+  EXPECT_THAT(message_of([] { parse_json("{\"a\": }", "x.json"); }), AllOf(HasSubstr("x.json"), HasSubstr("not JSON")));
+  EXPECT_EQ(parse_json("[[1]]", "x.json")[0][0], 1);
+}
+
+TEST_F(HostileFiles, NumbersBeyondTheirTypeAreNamed) {
+  const nlohmann::json object = {{"big", 5'000'000'000}, {"million", 1e6}, {"half", 0.5}, {"huge", 1e300}};
+  JsonReader reader(object, "/x");
+  EXPECT_EQ(small_integer(reader, "million", 0), 1'000'000);
+  EXPECT_EQ(small_integer(reader, "absent", 7), 7);
+  EXPECT_THAT(message_of([&] { small_integer(reader, "big", 0); }),
+              AllOf(HasSubstr("/x/big"), HasSubstr("5000000000")));
+  EXPECT_THAT(message_of([&] { small_integer(reader, "half", 0); }), HasSubstr("whole number"));
+  EXPECT_THAT(message_of([&] { small_integer(reader, "huge", 0); }), HasSubstr("whole number"));
+}
+
+// A grid that nobody stored: its cells are listed only where that is bounded.
+TEST_F(HostileFiles, GridsOfAThousandMillionCellsAreNotListed) {
+  file("a.vti",
+       "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1000 0 1000 0 1000\" Origin=\"0 0 0\" "
+       "Spacing=\"1 1 1\"><Piece Extent=\"0 1000 0 1000 0 1000\"/></ImageData></VTKFile>");
+  EXPECT_EQ(std::get<Grid>(read_rest_shape(file("a.vti"))).num_cells(), 1'000'000'000);
+  for (const std::string& message :
+       {message_of([&] { read_mesh(file("a.vti")); }), message_of([&] { read_points(file("a.vti")); })})
+    EXPECT_THAT(message, AllOf(HasSubstr("a.vti"), HasSubstr("1000000000 cells")));
+}
+
+}  // namespace
+}  // namespace halfgrad
