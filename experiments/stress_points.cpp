@@ -99,7 +99,7 @@ class PointMaker {
       });
   }
 
-  // A position of a cell, for embed() to find. A cell is sound where its map is one to one.
+  // A position of a cell, for embed() to find: surely where the cell is a simplex or a parallelepiped.
   void seek_inside(Index cell, bool at_vertex) {
     with_cell(mesh_, cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
       const NodeMatrix<E> positions = node_positions(mesh_, block, row);
@@ -108,7 +108,7 @@ class PointMaker {
       const Vector inside = positions.row(0).transpose() + edges.transpose() * E::shape(xi);
       const InverseMap<E> map(positions);
       positions_.push_back(at_vertex ? Vector(positions.row(E::num_nodes - 1).transpose()) : inside);
-      result_.in_cell.push_back(!map.degenerate() && map.one_signed());
+      result_.in_cell.push_back(!map.degenerate() && map.affine());
     });
   }
 

@@ -16,7 +16,7 @@ struct StressPoints {
   std::vector<Index> vertex;                    ///< #placed: the vertex at the point, or −1
   std::vector<std::pair<Index, Index>> shared;  ///< placed points at one place of a facet, seen from two cells
   Points positions;                             ///< of the located ones
-  std::vector<char> in_cell;  ///< of the located ones: 1 where the position was taken from a sound cell
+  std::vector<char> in_cell;  ///< of the located ones: 1 where it was taken from a cell whose map is affine
 
   /// The entry of embedding.outside of a point that its cell serves from outside, or null.
   const OutsidePoint* outside(Index point) const;

@@ -29,6 +29,10 @@ inline double ratio_of(long double error, long double bound) {
   return static_cast<double>(error / bound);
 }
 
+// The greatest |e| |g| of a usable cell for which bounds in units of rounding mean something: beyond it a cell's
+// thickness is a handful of units in the last place of its coordinates.
+inline constexpr double greatest_aspect = 1e9;
+
 // A smooth field with a bound on its second derivatives: a wave a column.
 struct Wave {
   Vector number;
@@ -63,7 +67,10 @@ class CaseRunner {
 
  private:
   void record(StressProperty property, double ratio, const std::string& place) {
-    result_.tallies[static_cast<std::size_t>(property)].add(ratio, result_.seed, place);
+    const bool always = property == StressProperty::served || property == StressProperty::finite ||
+                        property == StressProperty::constants || property == StressProperty::bad_vertex;
+    if (always || aspect_ <= greatest_aspect)
+      result_.tallies[static_cast<std::size_t>(property)].add(ratio, result_.seed, place);
   }
   // Whether a vertex belongs to a cell with volume.
   bool serves(Index vertex) const {

@@ -56,9 +56,9 @@ Extrapolation<E> extrapolate(const InverseMap<E>& map, const ReferencePoint<E>& 
     const auto jacobian = map.jacobian(xi);
     const double determinant = jacobian.determinant();
     if (inward < 1 && !(std::abs(determinant) > 1e-8 * jacobian.colwise().norm().prod())) continue;
-    const auto inverse = jacobian.inverse().eval();
-    ReferencePoint<E> offset = inverse * map.difference(position, xi);
-    offset += inverse * (map.difference(position, xi) - jacobian * offset);
+    const Eigen::FullPivLU<Eigen::Matrix<double, E::dim, E::dim>> solver(jacobian);
+    ReferencePoint<E> offset = solver.solve(map.difference(position, xi));
+    offset += solver.solve(map.difference(position, xi) - jacobian * offset);
     return {xi, offset};
   }
   return {closest, ReferencePoint<E>::Zero()};

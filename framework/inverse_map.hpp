@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "framework/cell_extent.hpp"
-#include "framework/refined_inverse.hpp"
 
 namespace halfgrad {
 
@@ -40,7 +39,7 @@ class InverseMap {
     determinant_ = jacobian.determinant();
     degenerate_ = is_degenerate<E>(extent, determinant_);
     if (degenerate_) return;
-    inverse_ = refined_inverse<E::dim>(jacobian);
+    inverse_ = jacobian.inverse();
     const NodeMatrix<E> reference = E::nodes();
     if constexpr (!E::affine) {
       const NodeMatrix<E> image = (reference.rowwise() - reference.row(0)) * jacobian.transpose();
@@ -118,6 +117,10 @@ class InverseMap {
     Point from_first = inverse_ * target;
     // One step of refinement gives flat cells the residual that the inverse alone would not.
     from_first += inverse_ * (target - jacobian * from_first);
+    // Where the inverse is worth nothing, on needles that are oblique to the axes, elimination with pivots is exact to
+    // the rounding of the position.
+    if (!((target - jacobian * from_first).cwiseAbs().maxCoeff() <= 1e-14 * std::max(1.0, target.norm())))
+      from_first = jacobian.fullPivLu().solve(target);
     result.xi = first + from_first;
     result.converged = true;
     return result;

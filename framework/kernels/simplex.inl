@@ -101,12 +101,16 @@ HWY_INLINE void evaluate_run(const PointStage<T>& stage, const Spread<T, d>& spr
 template <int d, class T>
 HWY_NOINLINE bool is_within_tolerance_of_edges(const PointStage<T>& stage, Index run, const T* vectors) {
   if (stage.extrapolates != nullptr && stage.extrapolates[run] != 0) return false;
-  const T longest = stage.tolerance * 2 * (d + 1) / d;
+  // Relative to the tolerance, so that squares of short lengths do not vanish in float.
+  const T per_longest = 1 / (stage.tolerance * 2 * (d + 1) / d);
   for (int e = 0; e < num_edges(d); ++e) {
     const T* const s = vectors + Spread<T, d>::size * stage.edges.of_run[static_cast<Offset>(run) * num_edges(d) + e];
     T squared = 0;
-    for (int c = 0; c < stage.num_columns; ++c) squared += s[c] * s[c];
-    if (!(squared <= longest * longest)) return false;
+    for (int c = 0; c < stage.num_columns; ++c) {
+      const T component = s[c] * per_longest;
+      squared += component * component;
+    }
+    if (!(squared <= 1)) return false;
   }
   return true;
 }
