@@ -5,6 +5,7 @@ build_packages=(g++ cmake ninja-build libeigen3-dev libfmt-dev nlohmann-json3-de
   libfast-float-dev libpugixml-dev zlib1g-dev libcli11-dev libnanoflann-dev libzip-dev pkg-config)
 test_packages=(libgtest-dev libgmock-dev librapidcheck-dev python3-scipy python3-meshio)
 check_packages=(clang-format)
+benchmark_packages=(libbenchmark-dev)
 fuzz_packages=(clang-14 libclang-rt-14-dev)
 coverage_packages=(gcovr)
 site_packages=(mkdocs mkdocs-material doxygen)

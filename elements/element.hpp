@@ -74,6 +74,18 @@ concept PolynomialElement = Element<E> && requires {
   { E::shape_coefficients[0][E::num_nodes - 1] } -> std::convertible_to<int>;
 };
 
+/// An element that also states how its cell is a cube, collapsed where corners share a node: by this the inverse map
+/// proves that no ξ of a cell maps to a position, and elements without it are searched from a lattice of starts.
+///
+/// cube_nodes           std::array of 2^dim nodes, that of corner c at u_k = bit k of c. With w_c(u) the multilinear
+/// weights
+///                      of the corners, ξ(u) = Σ_c w_c(u) node_cube_nodes[c] maps the unit cube onto the reference
+///                      cell, and β_i(ξ(u)) = Σ w_c(u) over the corners c that share node i
+template <class E>
+concept CubeElement = Element<E> && requires {
+  { E::cube_nodes[(std::size_t{1} << E::dim) - 1] } -> std::convertible_to<int>;
+};
+
 /// Whether ξ lies in the reference cell grown by `eps` (in reference lengths).
 template <Element E>
 bool contains(const ReferencePoint<E>& xi, double eps) {

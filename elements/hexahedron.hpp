@@ -25,6 +25,7 @@ struct Hexahedron {
                                                    {4, {3, 7, 6, 2}},
                                                    {4, {0, 3, 2, 1}},
                                                    {4, {4, 5, 6, 7}}}};
+  static constexpr std::array<int, 8> cube_nodes = {0, 1, 3, 2, 4, 5, 7, 6};
 
   static constexpr std::array<std::array<int, 3>, 8> shape_monomials = {
       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}}};

@@ -23,6 +23,7 @@ struct Pyramid {
   static constexpr double reference_volume = 1.0 / 3;
   static constexpr std::array<Facet, 5> facets = {
       {{4, {0, 3, 2, 1}}, {3, {0, 1, 4}}, {3, {1, 2, 4}}, {3, {2, 3, 4}}, {3, {3, 0, 4}}}};
+  static constexpr std::array<int, 8> cube_nodes = {0, 1, 3, 2, 4, 4, 4, 4};
 
   static Eigen::Matrix<double, 5, 3> nodes() {
     return (Eigen::Matrix<double, 5, 3>() << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0.5, 0.5, 1).finished();

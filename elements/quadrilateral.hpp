@@ -17,6 +17,7 @@ struct Quadrilateral {
   static constexpr bool affine = false;
   static constexpr double reference_volume = 1;
   static constexpr std::array<Facet, 4> facets = {{{2, {0, 1}}, {2, {1, 2}}, {2, {2, 3}}, {2, {3, 0}}}};
+  static constexpr std::array<int, 4> cube_nodes = {0, 1, 3, 2};
 
   static constexpr std::array<std::array<int, 2>, 4> shape_monomials = {{{0, 0}, {1, 0}, {0, 1}, {1, 1}}};
   static constexpr std::array<std::array<int, 4>, 4> shape_coefficients = {

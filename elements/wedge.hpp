@@ -21,6 +21,7 @@ struct Wedge {
   static constexpr double reference_volume = 1.0 / 2;
   static constexpr std::array<Facet, 5> facets = {
       {{3, {0, 2, 1}}, {3, {3, 4, 5}}, {4, {0, 1, 4, 3}}, {4, {1, 2, 5, 4}}, {4, {2, 0, 3, 5}}}};
+  static constexpr std::array<int, 8> cube_nodes = {0, 1, 2, 2, 3, 4, 5, 5};
 
   static constexpr std::array<std::array<int, 3>, 6> shape_monomials = {
       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}}};

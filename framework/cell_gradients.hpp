@@ -8,6 +8,7 @@
 
 #include "framework/cell_extent.hpp"
 #include "framework/mesh.hpp"
+#include "framework/refined_inverse.hpp"
 
 namespace halfgrad {
 
@@ -41,12 +42,12 @@ CellGradient cell_gradient(const NodeMatrix<E>& positions) {
     return result;
   }
   result.volume = std::abs(determinant) * E::reference_volume;
-  result.weights = derivative * jacobian.inverse();
+  result.weights = derivative * refined_inverse<E::dim>(jacobian);
   return result;
 }
 
-/// Incidence of a rest mesh and its cells' gradients at their centers. Cell geometry is computed on demand, so that a
-/// scene pays for the cells its stencils touch and no others. The mesh must outlive it. Thread-safe.
+/// Incidence of a rest mesh and its cells' gradients at their centers. Cell geometry and the boundary are computed on
+/// demand, so that a scene pays for the cells its stencils touch and no others. The mesh must outlive it. Thread-safe.
 class CellGradients {
  public:
   /// Throws Error on a surface, whose gradients are fitted in tangent planes (reconstruction/surface_gradients.hpp).
@@ -63,7 +64,8 @@ class CellGradients {
   std::span<const Index> vertices_of(Index cell) const {
     return table_ != nullptr ? table_->cells[cell] : mesh_->cell_vertices(cell);
   }
-  bool on_boundary(Index vertex) const { return boundary_[vertex] != 0; }
+  /// Whether a vertex lies on a facet that belongs to one cell only, or to more than two.
+  bool on_boundary(Index vertex) const;
   /// Centroid, volume and gradient stencil of a cell.
   CellGradient gradient(Index cell) const;
   /// Centroid of a cell, gdim.
@@ -74,7 +76,6 @@ class CellGradients {
   const Mesh* mesh_ = nullptr;
   const CellTable* table_ = nullptr;
   IndexTable vertex_cells_;
-  std::vector<char> boundary_;
 };
 
 }  // namespace halfgrad

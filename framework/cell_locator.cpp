@@ -5,8 +5,9 @@
 //   points in the sorted arrays               x[2]: | box 0 | box 1 | box 2 | …      best margin and its cell
 //
 // The boxes that a cell's bounds meet along the last axis are one contiguous range of points: a row. A cell tests rows.
-// Beside the result this takes 44 bytes a point in R³ (8 less a dimension less), at most 8 more for the boxes, and with
-// several threads 4 bytes a cell and slab that it meets.
+// ξ waits in this order too: written at the caller's places while cells are tested, it would miss the cache each time.
+// The result is allocated when the coordinates are no longer needed. In R³ this takes 64 bytes a point (16 less a
+// dimension less), at most 8 more for the boxes, and with several threads 4 bytes a cell and slab that it meets.
 #include "framework/cell_locator.hpp"
 
 #include <algorithm>
@@ -33,17 +34,40 @@ template <int D>
 struct Bounds {
   Coordinates<D> low = Coordinates<D>::Constant(infinity), high = Coordinates<D>::Constant(-infinity);
   bool contains(const Coordinates<D>& x) const {
-    return (x.array() >= low.array()).all() && (x.array() <= high.array()).all();
+    bool inside = true;
+    for (int a = 0; a < D; ++a) inside &= x[a] >= low[a] && x[a] <= high[a];
+    return inside;
+  }
+  bool meets(const Bounds& other) const {
+    bool met = true;
+    for (int a = 0; a < D; ++a) met &= other.low[a] <= high[a] && other.high[a] >= low[a];
+    return met;
+  }
+  void include(const Coordinates<D>& x) {
+    for (int a = 0; a < D; ++a) {
+      low[a] = std::min(low[a], x[a]);
+      high[a] = std::max(high[a], x[a]);
+    }
   }
 };
 
 // What a cell can hold: its nodes' bounds, grown by what the tolerance lets weights be negative.
 template <Element E>
-[[gnu::flatten]] Bounds<E::dim> cell_bounds(const NodeMatrix<E>& positions, double tolerance) {
-  Bounds<E::dim> bounds{positions.colwise().minCoeff().transpose(), positions.colwise().maxCoeff().transpose()};
-  const Coordinates<E::dim> growth = E::num_nodes * tolerance * (bounds.high - bounds.low);
-  bounds.low -= growth;
-  bounds.high += growth;
+Bounds<E::dim> cell_bounds(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, double tolerance) {
+  const double* vertices = mesh.vertices().data();
+  const Index* nodes = block.cells.data() + row * E::num_nodes;
+  Bounds<E::dim> bounds;
+  for (int a = 0; a < E::dim; ++a) {
+    double low = infinity, high = -infinity;
+    for (int i = 0; i < E::num_nodes; ++i) {
+      const double x = vertices[static_cast<Offset>(nodes[i]) * E::dim + a];
+      low = std::min(low, x);
+      high = std::max(high, x);
+    }
+    const double growth = E::num_nodes * tolerance * (high - low);
+    bounds.low[a] = low - growth;
+    bounds.high[a] = high + growth;
+  }
   return bounds;
 }
 
@@ -77,10 +101,7 @@ CellStatistics<D> cell_statistics(const Mesh& mesh, double tolerance) {
   });
   if (num_sampled > 0) result.mean_extent /= num_sampled;
   const auto vertices = mesh.vertices().template leftCols<D>();
-  for (Index v = 0; v < mesh.num_vertices(); ++v) {
-    result.bounds.low = result.bounds.low.cwiseMin(vertices.row(v).transpose());
-    result.bounds.high = result.bounds.high.cwiseMax(vertices.row(v).transpose());
-  }
+  for (Index v = 0; v < mesh.num_vertices(); ++v) result.bounds.include(vertices.row(v).transpose());
   const double growth = 1e-9 + max_nodes * tolerance;
   const Coordinates<D> extent = result.bounds.high - result.bounds.low;
   result.bounds.low -= growth * extent;
@@ -94,16 +115,14 @@ class PointGrid {
  public:
   PointGrid(const Points& points, const CellStatistics<D>& cells, Index num_cells);
 
-  Index num_points() const { return static_cast<Index>(id.size()); }
+  Index num_points() const { return static_cast<Index>(cell.size()); }
   int size(int axis) const { return size_[axis]; }
   // Boxes along an axis that hold a coordinate; monotone, so that no rounding separates a point from its cell.
   int box(int axis, double coordinate) const {
     const double scaled = (coordinate - bounds_.low[axis]) * per_length_[axis];
     return static_cast<int>(std::min(std::max(scaled, 0.0), size_[axis] - 1.0));
   }
-  bool meets(const Bounds<D>& other) const {
-    return (other.low.array() <= bounds_.high.array()).all() && (other.high.array() >= bounds_.low.array()).all();
-  }
+  bool meets(const Bounds<D>& cell_bounds) const { return bounds_.meets(cell_bounds); }
 
   Coordinates<D> position(Index point) const {
     Coordinates<D> result;
@@ -137,9 +156,10 @@ class PointGrid {
   }
 
   std::array<std::vector<double>, D> x;  // sorted coordinates, and max_lanes unused
-  std::vector<Index> id;                 // the caller's number of a sorted point
   std::vector<double> margin;            // greatest so far, and max_lanes unused
   std::vector<Index> cell;               // of that margin; −1: none yet
+  std::vector<Coordinates<D>> xi;        // in that cell
+  std::vector<Index> place;              // of each of the caller's points; −1 outside the mesh's bounds
 
  private:
   Bounds<D> bounds_;  // of the points
@@ -152,15 +172,14 @@ template <int D>
 PointGrid<D>::PointGrid(const Points& points, const CellStatistics<D>& cells, Index num_cells) {
   const Index count = static_cast<Index>(points.rows());
   const auto coordinates = points.template leftCols<D>();
-  std::vector<Index> box_of(count, -1);
+  place.assign(count, -1);
   Index num_kept = 0;
   for (Index p = 0; p < count; ++p) {
     const Coordinates<D> position = coordinates.row(p).transpose();
     if (!cells.bounds.contains(position)) continue;
-    box_of[p] = 0;
+    place[p] = 0;
     ++num_kept;
-    bounds_.low = bounds_.low.cwiseMin(position);
-    bounds_.high = bounds_.high.cwiseMax(position);
+    bounds_.include(position);
   }
   // Boxes in proportion to the cells' extents, so that a stretched mesh looks as an isotropic one; about one box for
   // two cells, and no more than two a point.
@@ -194,23 +213,22 @@ PointGrid<D>::PointGrid(const Points& points, const CellStatistics<D>& cells, In
 
   first_.assign(static_cast<std::size_t>(num_boxes) + 1, 0);
   for (Index p = 0; p < count; ++p) {
-    if (box_of[p] < 0) continue;
+    if (place[p] < 0) continue;
     std::int64_t index = 0;
     for (int a = 0; a < D; ++a) index = index * size_[a] + box(a, coordinates(p, a));
-    box_of[p] = static_cast<Index>(index);
+    place[p] = static_cast<Index>(index);
     ++first_[index + 1];
   }
   std::partial_sum(first_.begin(), first_.end(), first_.begin());
   // Rows are tested several points at a time and read beyond their ends.
   for (auto& axis : x) axis.resize(num_kept + max_lanes);
-  id.resize(num_kept);
   margin.assign(num_kept + max_lanes, -infinity);
   cell.assign(num_kept, -1);
+  xi.resize(num_kept);
   for (Index p = 0; p < count; ++p) {
-    if (box_of[p] < 0) continue;
-    const Index slot = first_[box_of[p]]++;
-    for (int a = 0; a < D; ++a) x[a][slot] = coordinates(p, a);
-    id[slot] = p;
+    if (place[p] < 0) continue;
+    place[p] = first_[place[p]]++;
+    for (int a = 0; a < D; ++a) x[a][place[p]] = coordinates(p, a);
   }
   // The insertion advanced every box to the start of the next one.
   std::move_backward(first_.begin(), first_.end() - 1, first_.end());
@@ -265,9 +283,8 @@ struct ClaimBuffers {
 // ξ at once, while the cell's map is at hand: few points are claimed more than once.
 template <Element E>
 void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Index cell, double tolerance,
-           PointGrid<E::dim>& grid, int first_slice, int last_slice, ClaimBuffers& buffers, Points& local) {
-  const NodeMatrix<E> positions = node_positions(mesh, block, row);
-  const Bounds<E::dim> bounds = cell_bounds<E>(positions, tolerance);
+           PointGrid<E::dim>& grid, int first_slice, int last_slice, ClaimBuffers& buffers) {
+  const Bounds<E::dim> bounds = cell_bounds(mesh, block, row, tolerance);
   if (!grid.meets(bounds)) return;
   if constexpr (E::affine) {
     buffers.rows.clear();
@@ -277,7 +294,7 @@ void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Ind
       num_points += end - begin;
     });
     if (num_points == 0) return;
-    const AffineCell<E> affine(positions, tolerance);
+    const AffineCell<E> affine(node_positions(mesh, block, row), tolerance);
     if (affine.map.degenerate()) return;
     if (static_cast<Index>(buffers.claimed.size()) < num_points) buffers.claimed.resize(num_points);
     PlaneTest<E::dim> test{affine.planes, affine.least, {}, grid.margin.data()};
@@ -286,7 +303,7 @@ void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Ind
     for (Index i = 0; i < num_claimed; ++i) {
       const Index p = buffers.claimed[i];
       grid.cell[p] = cell;
-      local.row(grid.id[p]).template head<E::dim>() = affine.xi(grid.position(p)).transpose();
+      grid.xi[p] = affine.xi(grid.position(p));
     }
   } else {
     std::optional<InverseMap<E>> map;
@@ -294,7 +311,7 @@ void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Ind
       for (Index p = begin; p < end; ++p) {
         const Coordinates<E::dim> position = grid.position(p);
         if (!bounds.contains(position)) continue;
-        if (!map) map.emplace(positions);
+        if (!map) map.emplace(node_positions(mesh, block, row));
         if (map->degenerate()) return;
         if (map->surely_outside(position, tolerance)) continue;
         const InverseMapResult<E> result = (*map)(position);
@@ -303,7 +320,7 @@ void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Ind
         if (margin < -tolerance || margin <= grid.margin[p]) continue;
         grid.margin[p] = margin;
         grid.cell[p] = cell;
-        local.row(grid.id[p]).template head<E::dim>() = result.xi.transpose();
+        grid.xi[p] = result.xi;
       }
     });
   }
@@ -333,7 +350,7 @@ std::vector<Slab> make_slabs(const Mesh& mesh, const PointGrid<D>& grid, double 
   for_each_block_of_dim<D>(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
     for (Slab& slab : slabs) slab.rows.emplace_back();
     for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
-      const Bounds<D> bounds = cell_bounds<E>(node_positions(mesh, block, c), tolerance);
+      const Bounds<D> bounds = cell_bounds(mesh, block, c, tolerance);
       if (!grid.meets(bounds)) continue;
       const int last = slab_of[grid.box(0, bounds.high[0])];
       for (int s = slab_of[grid.box(0, bounds.low[0])]; s <= last; ++s)
@@ -346,9 +363,7 @@ std::vector<Slab> make_slabs(const Mesh& mesh, const PointGrid<D>& grid, double 
 template <int D>
 CellLocations locate_in(const Mesh& mesh, const Points& points, double tolerance) {
   const Index count = static_cast<Index>(points.rows());
-  CellLocations result{std::vector<Index>(count, -1), Points::Zero(count, D)};
   PointGrid<D> grid(points, cell_statistics<D>(mesh, tolerance), mesh.num_cells());
-  if (grid.num_points() == 0) return result;
 
   // Slabs own their points, so that threads share nothing. Every slab sees the cells in ascending order: a later cell
   // wins by a greater margin only, which leaves ties to the lowest number. In one dimension the only axis is the rows'.
@@ -363,14 +378,22 @@ CellLocations locate_in(const Mesh& mesh, const Points& points, double tolerance
             whole ? static_cast<Index>(block.cells.rows()) : static_cast<Index>(slabs[s].rows[b].size());
         for (Index i = 0; i < num_rows; ++i) {
           const Index row = whole ? i : slabs[s].rows[b][i];
-          claim<E>(mesh, block, row, first + row, tolerance, grid, slabs[s].first_slice, slabs[s].last_slice, buffers,
-                   result.local);
+          claim<E>(mesh, block, row, first + row, tolerance, grid, slabs[s].first_slice, slabs[s].last_slice, buffers);
         }
         ++b;
       });
     }
   });
-  for (Index p = 0; p < grid.num_points(); ++p) result.cells[grid.id[p]] = grid.cell[p];
+  for (auto& axis : grid.x) std::vector<double>().swap(axis);
+  std::vector<double>().swap(grid.margin);
+  CellLocations result{std::vector<Index>(count, -1), Points(count, D)};
+  parallel_for(count, 65536, [&](std::int64_t begin, std::int64_t end) {
+    for (auto p = static_cast<Index>(begin); p < end; ++p) {
+      const Index place = grid.place[p];
+      if (place >= 0) result.cells[p] = grid.cell[place];
+      for (int a = 0; a < D; ++a) result.local(p, a) = result.cells[p] >= 0 ? grid.xi[place][a] : 0;
+    }
+  });
   return result;
 }
 

@@ -67,13 +67,14 @@ Extrapolation<E> extrapolate(const InverseMap<E>& map, const ReferencePoint<E>& 
 struct Nearest {
   Index cell;
   double distance;
-  Vector xi, offset;
+  Vector closest;     // ξ of the closest point
+  Vector xi, offset;  // of extrapolate()
   bool affine;
 };
 
 Nearest nearest(const Mesh& mesh, const NearestCell& search, const Vector& position) {
   const NearestCell::Result found = search.find(position);
-  Nearest result{found.side.cell, std::sqrt(found.point.squared_distance), {}, {}, false};
+  Nearest result{found.side.cell, std::sqrt(found.point.squared_distance), {}, {}, {}, false};
   with_cell(mesh, result.cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
     const Facet& facet = E::facets[found.side.facet];
     ReferencePoint<E> closest = ReferencePoint<E>::Zero();
@@ -81,6 +82,7 @@ Nearest nearest(const Mesh& mesh, const NearestCell& search, const Vector& posit
       closest += found.point.weights[i] * E::nodes().row(facet.nodes[i]).transpose();
     const InverseMap<E> map(node_positions(mesh, block, row));
     const Extrapolation<E> extrapolation = extrapolate<E>(map, position, closest);
+    result.closest = closest;
     result.xi = extrapolation.xi;
     result.offset = extrapolation.offset;
     result.affine = map.affine();
@@ -97,6 +99,7 @@ void check_points(const Points& points, int gdim, const EmbedOptions& options) {
     raise("{} points: at most {} can be numbered", points.rows(), std::numeric_limits<Index>::max());
   if (!(options.tolerance >= 0) || !(options.tolerance < 0.1))
     raise("an embedding tolerance of {}: expected a number from 0 to 0.1", options.tolerance);
+  if (points.allFinite()) return;
   for (Index p = 0; p < points.rows(); ++p)
     if (!points.row(p).allFinite()) raise("point {} is {}: expected finite coordinates", p, describe(points, p));
 }
@@ -146,8 +149,9 @@ Embedding embed(const Mesh& mesh, const Points& points, const EmbedOptions& opti
     const bool on_boundary = at.distance <= options.tolerance * diagonal;
     if (on_boundary || options.outside != Outside::mark) {
       result.cells[p] = at.cell;
-      // An affine cell takes the rest of the way in ξ itself; elsewhere the move is below the tolerance.
-      result.local.row(p) = (on_boundary && at.affine ? Vector(at.xi + at.offset) : at.xi).transpose();
+      // An affine cell takes the rest of the way in ξ itself; elsewhere the move to the closest point is below the
+      // tolerance.
+      result.local.row(p) = (!on_boundary ? at.xi : at.affine ? Vector(at.xi + at.offset) : at.closest).transpose();
     }
     if (on_boundary) {
       result.status[p] = PointStatus::boundary;

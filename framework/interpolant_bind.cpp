@@ -8,17 +8,52 @@ namespace halfgrad {
 
 namespace {
 
-// Interleaves the bits of quantised coordinates: cells near in space get near numbers.
-std::uint64_t morton_code(const Vector& unit) {
-  const int gdim = static_cast<int>(unit.size());
-  const int bits = std::min(21, 63 / gdim);
-  std::uint64_t code = 0;
-  std::array<std::uint64_t, 8> coordinate{};
-  for (int k = 0; k < gdim; ++k)
-    coordinate[k] = static_cast<std::uint64_t>(std::clamp(unit[k], 0.0, 1.0) * static_cast<double>((1ull << bits) - 1));
-  for (int b = bits - 1; b >= 0; --b)
-    for (int k = 0; k < gdim; ++k) code = (code << 1) | ((coordinate[k] >> b) & 1);
-  return code;
+// Interleaves the bits of quantised coordinates, 32 in all: cells near in space get near numbers.
+class MortonCode {
+ public:
+  explicit MortonCode(const Points& vertices) : gdim_(static_cast<int>(vertices.cols())) {
+    const Eigen::RowVectorXd low = vertices.colwise().minCoeff(), high = vertices.colwise().maxCoeff();
+    const double extent = (high - low).maxCoeff();
+    low_.assign(low.begin(), low.end());
+    const double steps = static_cast<double>((std::int64_t{1} << 32 / gdim_) - 1);
+    scale_ = extent > 0 ? steps / extent : 0;
+    for (std::uint32_t byte = 0; byte < 256; ++byte)
+      for (int b = 0; b < 8; ++b) spread_[byte] |= static_cast<std::uint64_t>(byte >> b & 1) << b * gdim_;
+  }
+
+  std::uint32_t operator()(const double* position) const {
+    std::uint64_t code = 0;
+    for (int k = 0; k < gdim_; ++k) {
+      const auto step = static_cast<std::uint32_t>((position[k] - low_[k]) * scale_);
+      for (int byte = 0; 8 * byte < 32 / gdim_; ++byte)
+        code |= spread_[step >> 8 * byte & 255] << (8 * byte * gdim_ + gdim_ - 1 - k);
+    }
+    return static_cast<std::uint32_t>(code);
+  }
+
+ private:
+  int gdim_;
+  std::vector<double> low_;
+  double scale_;
+  std::array<std::uint64_t, 256> spread_{};
+};
+
+struct CodedCell {
+  std::uint32_t code;
+  Index cell;
+};
+
+// Sorts by code; cells of one code keep their order.
+void sort_by_code(std::vector<CodedCell>& cells) {
+  constexpr int bits = 11, mask = (1 << bits) - 1;
+  std::vector<CodedCell> sorted(cells.size());
+  for (int shift = 0; shift < 32; shift += bits) {
+    std::array<Index, mask + 2> next{};
+    for (const CodedCell& cell : cells) ++next[(cell.code >> shift & mask) + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    for (const CodedCell& cell : cells) sorted[next[cell.code >> shift & mask]++] = cell;
+    cells.swap(sorted);
+  }
 }
 
 // The cells that hold points, sorted along a space-filling curve, and the points of each in ascending order.
@@ -32,35 +67,30 @@ CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
   std::vector<Index> count(static_cast<std::size_t>(mesh.num_cells()), 0);
   for (Index cell : embedding.cells)
     if (cell >= 0) ++count[cell];
-  struct Keyed {
-    std::uint64_t code;
-    Index cell;
-    bool operator<(const Keyed& other) const { return code != other.code ? code < other.code : cell < other.cell; }
-  };
-  const auto corner = [&](Index cell) { return Vector(mesh.vertices().row(mesh.cell_vertices(cell)[0]).transpose()); };
-  Vector low, high;
-  if (mesh.num_vertices() > 0) {
-    low = mesh.vertices().colwise().minCoeff().transpose();
-    high = mesh.vertices().colwise().maxCoeff().transpose();
+  std::vector<CodedCell> coded;
+  if (mesh.num_cells() > 0) {
+    const MortonCode code(mesh.vertices());
+    for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
+      for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
+        if (const auto cell = static_cast<Index>(first + c); count[cell] > 0)
+          coded.push_back({code(mesh.vertices().data() + block.cells(c, 0) * mesh.vertices().cols()), cell});
+    });
   }
-  const double extent = mesh.num_vertices() > 0 ? (high - low).maxCoeff() : 0;
-  const double scale = extent > 0 ? 1 / extent : 0;
-  std::vector<Keyed> keyed;
-  for (Index cell = 0; cell < mesh.num_cells(); ++cell)
-    if (count[cell] > 0) keyed.push_back({morton_code((corner(cell) - low) * scale), cell});
-  std::sort(keyed.begin(), keyed.end());
+  sort_by_code(coded);
 
   CellOrder order;
+  order.cells.reserve(coded.size());
+  order.first_point.reserve(coded.size() + 1);
   order.first_point.push_back(0);
-  std::vector<Index> next(count.size(), 0);
-  for (const Keyed& key : keyed) {
-    next[key.cell] = order.first_point.back();
-    order.cells.push_back(key.cell);
-    order.first_point.push_back(order.first_point.back() + count[key.cell]);
+  for (const CodedCell& each : coded) {
+    const Index begin = order.first_point.back();
+    order.cells.push_back(each.cell);
+    order.first_point.push_back(begin + count[each.cell]);
+    count[each.cell] = begin;  // now where the cell's next point goes
   }
   order.points.resize(static_cast<std::size_t>(order.first_point.back()));
   for (Index p = 0; p < embedding.num_points(); ++p)
-    if (embedding.cells[p] >= 0) order.points[next[embedding.cells[p]]++] = p;
+    if (embedding.cells[p] >= 0) order.points[count[embedding.cells[p]]++] = p;
   return order;
 }
 
@@ -140,22 +170,6 @@ bool has_affine_map(const NodeMatrix<E>& nodes, double magnitude) {
   return true;
 }
 
-// The chunks of each run.
-template <class Scalar, class Runs>
-void cut_into_chunks(Runs& runs) {
-  constexpr Index size = kernels::chunk_size<Scalar>;
-  const Index num_runs = runs.num_runs();
-  runs.first_chunk.resize(static_cast<std::size_t>(num_runs) + 1);
-  for (Index r = 0; r < num_runs; ++r)
-    runs.first_chunk[r + 1] = runs.first_chunk[r] + (runs.first[r + 1] - runs.first[r] + size - 1) / size;
-  runs.chunks.assign(static_cast<std::size_t>(runs.first_chunk.back()), static_cast<std::uint8_t>(size));
-  for (Index r = 0; r < num_runs; ++r) {
-    const Index last = runs.first_chunk[r + 1] - 1;
-    const Index count = runs.first[r + 1] - runs.first[r] - (last - runs.first_chunk[r]) * size;
-    runs.chunks[last] = static_cast<std::uint8_t>(count | kernels::last_chunk);
-  }
-}
-
 // Fills the runs of one element type from the cells `members` (places in order.cells); sizes are exact.
 template <class Runs, class Scalar>
 void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& order, std::span<const Index> members,
@@ -170,10 +184,10 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
   const auto num_points = static_cast<std::size_t>(runs.first.back());
   runs.local.assign(num_points * d + kernels::vector_padding, Scalar(0));
-  cut_into_chunks<Scalar>(runs);
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
   if (!outside_row.empty() && !E::affine) runs.offset.assign(num_points, -1);
+  const Index* last_point = order.points.data() + order.points.size() - 1;
   parallel_for(static_cast<std::int64_t>(num_runs), 4096, [&](std::int64_t begin, std::int64_t end) {
     for (auto r = static_cast<Index>(begin); r < end; ++r) {
       const Index cell = order.cells[members[r]];
@@ -190,13 +204,15 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
             has_affine_map<Scalar, E>(positions.rowwise() - positions.row(0), positions.cwiseAbs().maxCoeff());
       const Index* points = order.points.data() + order.first_point[members[r]];
       for (Index p = runs.first[r]; p < runs.first[r + 1]; ++p, ++points) {
+        // Points lie anywhere in the caller's order: each would miss the cache.
+        __builtin_prefetch(embedding.local.data() + points[std::min<std::ptrdiff_t>(24, last_point - points)] * d);
         permutation[p] = *points;
         // On a simplex a point outside differs from one inside by its ξ alone; elsewhere it keeps its offset apart.
         const bool outside = !outside_row.empty() && outside_row[*points] >= 0;
         for (int k = 0; k < d; ++k) {
           double xi = embedding.local(*points, k);
           if (E::affine && outside) xi += embedding.outside[outside_row[*points]].offset[k];
-          runs.local[runs.local_place(r, p, k)] = static_cast<Scalar>(xi);
+          runs.local[static_cast<Offset>(p) * d + k] = static_cast<Scalar>(xi);
         }
         if (outside) runs.extrapolates[r] = 1;
       }
@@ -219,17 +235,18 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
   std::vector<Index> row_of(number.size(), -1);
   for (Index r = 0; r < table.num_rows(); ++r) row_of[table.vertices[r]] = r;
   const int d = table.gdim, sym = with_hessians ? num_symmetric(d) : 0, width = d + sym;
-  stencils.offsets.resize(static_cast<std::size_t>(num_active) + 1);
+  stencils.width = width;
+  stencils.first_group.resize(static_cast<std::size_t>(num_active) + 1);
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
     if (r < 0) raise("no gradient stencil for vertex {}: reconstruct every active vertex", vertices[v]);
-    stencils.offsets[v + 1] = stencils.offsets[v] + table.offsets[r + 1] - table.offsets[r];
+    stencils.first_group[v + 1] = stencils.first_group[v] + (table.offsets[r + 1] - table.offsets[r] + 3) / 4;
   }
-  stencils.neighbors.resize(static_cast<std::size_t>(stencils.offsets.back()));
-  stencils.weights.resize(stencils.neighbors.size() * static_cast<std::size_t>(width) + kernels::vector_padding);
+  stencils.neighbors.resize(static_cast<std::size_t>(4 * stencils.first_group.back()));
+  stencils.weights.assign(stencils.neighbors.size() * static_cast<std::size_t>(width), Scalar(0));
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
-    Offset to = stencils.offsets[v];
+    Offset to = stencils.begin(v);
     for (Offset e = table.offsets[r]; e < table.offsets[r + 1]; ++e, ++to) {
       Index& neighbor = number[table.neighbors[e]];
       if (neighbor < 0) {
@@ -237,12 +254,13 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
         vertices.push_back(table.neighbors[e]);
       }
       stencils.neighbors[to] = neighbor;
-      for (int k = 0; k < d; ++k) stencils.weights[to * width + k] = static_cast<Scalar>(table.weights[e * d + k]);
+      for (int k = 0; k < d; ++k)
+        stencils.weights[stencils.place(to, k)] = static_cast<Scalar>(table.weights[e * d + k]);
       for (int k = 0; k < sym; ++k)
-        stencils.weights[to * width + d + k] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
+        stencils.weights[stencils.place(to, d + k)] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
     }
+    std::fill(stencils.neighbors.begin() + to, stencils.neighbors.begin() + stencils.end(v), v);
   }
-  vertices.shrink_to_fit();
 }
 
 }  // namespace
@@ -256,11 +274,38 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
   if (rule.needs_hessians() && !table.has_hessians() && table.num_rows() > 0)
     raise("dual_taylor needs vertex Hessians: use the reconstructor {{\"kriging\": {{\"drift\": \"cubic\"}}}}");
   has_gradients = true;
-  if (reconstruction->blend)
+  if (reconstruction->blend) {
     blended = select_rows(*reconstruction, vertices);
-  else
-    pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
-  report.num_stencil_entries = blended ? table.num_entries() : static_cast<Offset>(stencils.neighbors.size());
+    take_blend(number);
+  }
+  pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
+  vertices.shrink_to_fit();
+  report.num_stencil_entries += table.num_entries();
+}
+
+template <class Scalar>
+void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
+  const AdaptiveBlend& given = *blended->blend;
+  // Rows of the probing table are vertices of the same number.
+  for (Index r = num_active; r < given.probing.num_rows(); ++r) {
+    number[given.probing.vertices[r]] = static_cast<Index>(vertices.size());
+    vertices.push_back(given.probing.vertices[r]);
+  }
+  pack_stencils(given.probing, false, given.probing.num_rows(), vertices, number, blend.probing);
+  pack_stencils(given.averaging, false, num_active, vertices, number, blend.averaging);
+  report.num_stencil_entries += given.probing.num_entries() + given.averaging.num_entries();
+  for (Offset e = 0; e < static_cast<Offset>(given.edge_rows.size()); ++e) {
+    const Eigen::Map<const Eigen::VectorXd> edge(given.edges.data() + e * gdim, gdim);
+    const double length = edge.norm();
+    blend.edges.push_back(static_cast<Scalar>(2 / length));
+    for (int a = 0; a < gdim; ++a) blend.edges.push_back(static_cast<Scalar>(edge[a] / length));
+  }
+  for (Index r = 0; r < num_active; ++r) {
+    const EdgeMetric metric = edge_metric(given, r, gdim);
+    for (const SmallMatrix* matrix : {&metric.sum, &metric.damped_inverse})
+      for (int a = 0; a < gdim; ++a)
+        for (int c = a; c < gdim; ++c) blend.metrics.push_back(static_cast<Scalar>((*matrix)(a, c)));
+  }
 }
 
 template <class Scalar>
@@ -269,16 +314,19 @@ void Interpolant<Scalar>::Binding::count_bytes() {
   for (const auto& any : blocks)
     std::visit(
         [&](const auto& runs) {
-          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.first_chunk) +
-                          bytes(runs.chunks) + bytes(runs.affine) + bytes(runs.local) + bytes(runs.offset) +
-                          bytes(runs.offsets) + bytes(runs.extrapolates);
+          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.affine) +
+                          bytes(runs.local) + bytes(runs.offset) + bytes(runs.offsets) + bytes(runs.extrapolates) +
+                          bytes(runs.edges.first) + bytes(runs.edges.ends) + bytes(runs.edges.vectors) +
+                          bytes(runs.edges.of_run) + bytes(runs.edges.reversed);
         },
         any);
   report.bytes += bytes(weighted.first) + bytes(weighted.nodes) + bytes(weighted.coefficients) + bytes(weighted.beta);
-  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position) + bytes(stencils.offsets) +
-                  bytes(stencils.neighbors) + bytes(stencils.weights);
+  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position);
+  for (const Stencils* rows : {&stencils, &blend.averaging, &blend.probing})
+    report.bytes += bytes(rows->first_group) + bytes(rows->neighbors) + bytes(rows->weights);
+  report.bytes += bytes(blend.edges) + bytes(blend.metrics);
   if (blended)
-    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging})
+    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging, &blended->blend->probing})
       report.bytes += bytes(table->offsets) + bytes(table->neighbors) + bytes(table->weights);
 }
 
@@ -337,6 +385,9 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
     runs.base = base;
     pack_runs<Runs, Scalar>(mesh, embedding, order, members, numbers.empty() ? number : part_number, outside_row, runs,
                             binding->permutation.data() + base);
+    if constexpr (E::affine)
+      if (rule.needs_gradients() && !rule.needs_hessians())
+        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, runs.rest);
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));
   });

@@ -3,8 +3,10 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <vector>
 
 #include "framework/cell_extent.hpp"
+#include "framework/refined_inverse.hpp"
 
 namespace halfgrad {
 
@@ -38,7 +40,7 @@ class InverseMap {
     determinant_ = jacobian.determinant();
     degenerate_ = is_degenerate<E>(extent, determinant_);
     if (degenerate_) return;
-    inverse_ = jacobian.inverse();
+    inverse_ = refined_inverse<E::dim>(jacobian);
     const NodeMatrix<E> reference = E::nodes();
     if constexpr (!E::affine) {
       const NodeMatrix<E> image = (reference.rowwise() - reference.row(0)) * jacobian.transpose();
@@ -72,15 +74,8 @@ class InverseMap {
   InverseMapResult<E> operator()(const Point& position) const {
     const Point target = scaled(position);
     if (affine_) return solve_affine(target);
-    InverseMapResult<E> result = newton(target, clamped(affine_guess(target)));
-    if (unique(result)) return result;
-    for (const double reach : {0.95, 0.5})
-      for (const Facet& facet : E::facets) {
-        if (try_start(target, facet_middle(facet), reach, result)) return result;
-        for (int i = 0; i < facet.num_nodes; ++i)
-          if (try_start(target, E::nodes().row(facet.nodes[i]).transpose(), reach, result)) return result;
-      }
-    return result;
+    const InverseMapResult<E> result = newton(target, clamped(affine_guess(target)));
+    return settles(result) ? result : search(target, result);
   }
 
  private:
@@ -93,11 +88,6 @@ class InverseMap {
   static Point clamped(const Point& xi) {
     const NodeMatrix<E> nodes = E::nodes();
     return xi.cwiseMax(nodes.colwise().minCoeff().transpose()).cwiseMin(nodes.colwise().maxCoeff().transpose());
-  }
-  static Point facet_middle(const Facet& facet) {
-    Point middle = Point::Zero();
-    for (int i = 0; i < facet.num_nodes; ++i) middle += E::nodes().row(facet.nodes[i]).transpose() / facet.num_nodes;
-    return middle;
   }
 
   // How far the map is from its linear part: the columns of J are mean values of the columns at the nodes, so their
@@ -164,19 +154,69 @@ class InverseMap {
     return result;
   }
 
-  // Whether no other start can find a ξ in the cell: this one is in it, or on the side of the fold det J = 0 on which
-  // the cell lies, where the map is one to one.
-  bool unique(const InverseMapResult<E>& result) const {
+  // Whether no other start need be tried: ξ is in the cell. For an element whose search is no proof, also where ξ is on
+  // the side of the fold det J = 0 on which the cell lies.
+  bool settles(const InverseMapResult<E>& result) const {
     if (!result.converged) return false;
     if (E::margin(result.xi) >= 0) return true;
-    return one_signed_ && scaled_jacobian(result.xi).determinant() * determinant_ > 0;
+    return !CubeElement<E> && one_signed_ && scaled_jacobian(result.xi).determinant() * determinant_ > 0;
   }
 
-  // Iterates from a point between the center and `from`; keeps the ξ of greater margin. True where the search is over.
-  bool try_start(const Point& target, const Point& from, double reach, InverseMapResult<E>& best) const {
-    const InverseMapResult<E> other = newton(target, E::center() + reach * (from - E::center()));
-    if (other.converged && (!best.converged || E::margin(other.xi) > E::margin(best.xi))) best = other;
-    return best.converged && E::margin(best.xi) >= 0;
+  // A part of the cell by its corners, a row each: ξ, and J_c⁻¹ (x(ξ) − X).
+  static constexpr int num_corners = 1 << E::dim;
+  using Part = Eigen::Matrix<double, num_corners, 2 * E::dim>;
+
+  Part whole(const Point& target) const {
+    const NodeMatrix<E> nodes = E::nodes();
+    Part part = Part::Zero();
+    for (int c = 0; c < num_corners; ++c) {
+      if constexpr (CubeElement<E>) {
+        const int node = E::cube_nodes[c];
+        part.row(c).template head<E::dim>() = nodes.row(node);
+        part.row(c).template tail<E::dim>() = (inverse_ * (nodes_.row(node).transpose() - target)).transpose();
+      } else {
+        for (int a = 0; a < E::dim; ++a) part(c, a) = c >> a & 1 ? nodes.col(a).maxCoeff() : nodes.col(a).minCoeff();
+      }
+    }
+    return part;
+  }
+
+  // Whether a plane has the images of all corners on one side, and the position on the other.
+  static bool excludes(const Part& part, double slack) {
+    const auto images = part.template rightCols<E::dim>();
+    return (images.colwise().minCoeff().array() > slack).any() || (images.colwise().maxCoeff().array() < -slack).any();
+  }
+
+  // Halves the cell along one axis after the other, iterates from the middles of the parts, and drops parts that cannot
+  // hold the position: a multilinear map has the image of a part in the hull of its corners' images. Where no part is
+  // left the position is outside. Keeps the ξ of greatest margin.
+  InverseMapResult<E> search(const Point& target, InverseMapResult<E> best) const {
+    constexpr int max_halvings = (CubeElement<E> ? 16 : 3) * E::dim, max_starts = 1000;
+    // Beside rounding, what the tolerances of callers let a position be outside.
+    const double slack = 1e-6 + 1e-15 * inverse_.cwiseAbs().rowwise().sum().maxCoeff();
+    std::vector<Part> parts{whole(target)}, halves;
+    int num_starts = 0;
+    for (int halving = 0; halving < max_halvings && !parts.empty(); ++halving) {
+      const int axis = halving % E::dim;
+      for (const Part& part : parts) {
+        if (CubeElement<E> && excludes(part, slack)) continue;
+        // Most parts are dropped before all axes are halved: an iteration costs more than a halving.
+        if (axis == E::dim - 1) {
+          const InverseMapResult<E> found =
+              newton(target, part.template leftCols<E::dim>().colwise().mean().transpose());
+          if (found.converged && (!best.converged || E::margin(found.xi) > E::margin(best.xi))) best = found;
+          if (settles(best) || ++num_starts == max_starts) return best;
+        }
+        Part low = part, high = part;
+        for (int c = 0; c < num_corners; ++c)
+          (c >> axis & 1 ? low : high).row(c) = 0.5 * (part.row(c) + part.row(c ^ 1 << axis));
+        halves.push_back(low);
+        halves.push_back(high);
+      }
+      parts.swap(halves);
+      halves.clear();
+    }
+    return best;
   }
 
   Point origin_;

@@ -111,6 +111,7 @@ Mesh::Mesh(Points vertices, std::vector<AnyBlock> blocks) : vertices_(std::move(
 }
 
 std::size_t Mesh::block_of(Index cell) const {
+  if (blocks_.size() == 1) return 0;
   return static_cast<std::size_t>(std::upper_bound(first_cell_.begin(), first_cell_.end(), cell) - first_cell_.begin() -
                                   1);
 }

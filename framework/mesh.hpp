@@ -104,17 +104,22 @@ IndexTable vertex_cells(const Mesh& mesh);
 /// A facet by its vertices in ascending order, the greatest Index where it has fewer than four.
 using FacetKey = std::array<Index, 4>;
 
+/// Appends the facets of a cell.
+template <Element E>
+void append_facets(const ElementBlock<E>& block, Eigen::Index row, std::vector<FacetKey>& facets) {
+  for (const Facet& facet : E::facets) {
+    FacetKey key;
+    key.fill(std::numeric_limits<Index>::max());
+    for (int i = 0; i < facet.num_nodes; ++i) key[i] = block.cells(row, facet.nodes[i]);
+    std::sort(key.begin(), key.end());
+    facets.push_back(key);
+  }
+}
+
 /// Appends the facets of a block, one for each cell at it.
 template <Element E>
 void append_facets(const ElementBlock<E>& block, std::vector<FacetKey>& facets) {
-  for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
-    for (const Facet& facet : E::facets) {
-      FacetKey key;
-      key.fill(std::numeric_limits<Index>::max());
-      for (int i = 0; i < facet.num_nodes; ++i) key[i] = block.cells(c, facet.nodes[i]);
-      std::sort(key.begin(), key.end());
-      facets.push_back(key);
-    }
+  for (Eigen::Index c = 0; c < block.cells.rows(); ++c) append_facets(block, c, facets);
 }
 
 /// For each vertex 1 where it lies on a facet that is listed once only (or more than twice), else 0.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "framework/error.hpp"
 #include "reconstruction/row_assembly.hpp"
@@ -14,111 +15,150 @@ namespace halfgrad {
 
 namespace {
 
-struct UsableCell {
-  Index cell;
-  double volume;
-  Vector offset;  // centroid − vertex
-};
-
-UsableCell usable_cell(const CellGradients& cells, Index vertex, Index cell) {
-  const CellGradient gradient = cells.gradient(cell);
-  return {cell, gradient.volume, gradient.centroid - cells.vertices().row(vertex).transpose()};
+void add_adjacent(const CellGradients& cells, Index vertex, CellStar& star) {
+  for (const Index cell : cells.cells_of(vertex)) star.add(vertex, cell);
 }
 
-std::vector<UsableCell> adjacent_cells(const CellGradients& cells, Index vertex) {
-  std::vector<UsableCell> usable;
-  for (Index cell : cells.cells_of(vertex)) {
-    UsableCell candidate = usable_cell(cells, vertex, cell);
-    if (candidate.volume > 0) usable.push_back(candidate);
-  }
-  return usable;
+bool on_vertex(const Vector& offset) { return !(offset.squaredNorm() > 0); }
+
+// Weights by inverse distance. Far from the origin rounding may put a centroid onto the vertex: in the limit the
+// weights of all other cells are then zero.
+void weigh_by_distance(CellStar& star) {
+  const bool any_on_vertex = std::any_of(star.offsets.begin(), star.offsets.end(), on_vertex);
+  star.weights.clear();
+  for (const Vector& offset : star.offsets)
+    star.weights.push_back(!any_on_vertex ? 1 / offset.norm() : on_vertex(offset) ? 1.0 : 0.0);
 }
 
-CellWeights normalised(const std::vector<UsableCell>& usable, const std::vector<double>& raw) {
-  CellWeights result;
-  const double sum = std::accumulate(raw.begin(), raw.end(), 0.0);
-  for (std::size_t k = 0; k < usable.size(); ++k) {
-    result.cells.push_back(usable[k].cell);
-    result.weights.push_back(raw[k] / sum);
-  }
-  return result;
-}
-
-// James 2020, Eq. 24–27 over any set of cells.
-CellWeights consistent_weights(const std::vector<UsableCell>& usable, double epsilon, Index vertex) {
-  if (usable.empty()) return {};
-  const Eigen::Index gdim = usable.front().offset.size();
-  SmallMatrix normal = SmallMatrix::Zero(gdim, gdim);
-  Vector sum = Vector::Zero(gdim);
-  for (const UsableCell& cell : usable) {
-    const Vector direction = cell.offset.normalized();
+// James 2020, Eq. 24–27 over the cells of a star in D dimensions.
+template <int D>
+void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
+  using Direction = Eigen::Matrix<double, D, 1>;
+  using Square = Eigen::Matrix<double, D, D>;
+  Square normal = epsilon * Square::Identity();
+  Direction sum = Direction::Zero();
+  for (const Vector& offset : star.offsets) {
+    star.weights.push_back(1 / offset.template head<D>().norm());
+    const Direction direction = offset.template head<D>() * star.weights.back();
     normal += direction * direction.transpose();
     sum += direction;
   }
-  // The eigenbasis solves the small symmetric system and tells its rank.
-  const SymmetricEigen eigen = symmetric_eigen(normal + epsilon * SmallMatrix::Identity(gdim, gdim));
-  const double singular = 1e-12 * static_cast<double>(usable.size());
-  if (!(eigen.values[0] > singular))
+  // The trace of the inverse is between one and D times that of the least eigenvalue.
+  const Square inverse = normal.inverse();
+  const double least = 1 / inverse.trace();
+  if (!(least > 1e-12 * static_cast<double>(star.cells.size())))
     raise(
         "chandrashekar_garg: the weights of vertex {} are not determined with epsilon {} (least eigenvalue {:.3g}): "
         "use epsilon > 0",
-        vertex, epsilon, eigen.values[0]);
-  const Vector lambda = -(eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose() * sum);
-  std::vector<double> raw;
+        vertex, epsilon, symmetric_eigen(normal).values[0]);
+  const Direction lambda = -(inverse * sum);
   double total = 0, magnitude = 0;
-  for (const UsableCell& cell : usable) {
-    const double distance = cell.offset.norm();
-    raw.push_back((1 + lambda.dot(cell.offset) / distance) / distance);
-    total += raw.back();
-    magnitude += std::abs(raw.back()) + 1 / distance;
+  for (std::size_t k = 0; k < star.weights.size(); ++k) {
+    const double closeness = star.weights[k];
+    star.weights[k] = (1 + lambda.dot(star.offsets[k].template head<D>()) * closeness) * closeness;
+    total += star.weights[k];
+    magnitude += std::abs(star.weights[k]) + closeness;
   }
   // On flat one-sided stars small ε drives all weights to zero and the quotient to 0/0.
-  if (!(std::abs(total) > 1e-10 * magnitude)) {
-    if (epsilon == 0)
-      raise("chandrashekar_garg: the weights of vertex {} sum to zero with epsilon 0: use epsilon > 0", vertex);
-    for (std::size_t k = 0; k < usable.size(); ++k) raw[k] = 1 / usable[k].offset.norm();
-  }
-  return normalised(usable, raw);
+  if (std::abs(total) > 1e-10 * magnitude) return;
+  if (epsilon == 0)
+    raise("chandrashekar_garg: the weights of vertex {} sum to zero with epsilon 0: use epsilon > 0", vertex);
+  weigh_by_distance(star);
+}
+
+void weigh_consistently(int gdim, double epsilon, Index vertex, CellStar& star) {
+  static_assert(max_gdim == 4);
+  if (star.cells.empty()) return;
+  if (std::any_of(star.offsets.begin(), star.offsets.end(), on_vertex)) return weigh_by_distance(star);
+  if (gdim == 1) return weigh_consistently<1>(epsilon, vertex, star);
+  if (gdim == 2) return weigh_consistently<2>(epsilon, vertex, star);
+  if (gdim == 3) return weigh_consistently<3>(epsilon, vertex, star);
+  weigh_consistently<4>(epsilon, vertex, star);
 }
 
 }  // namespace
 
+void CellStar::clear() {
+  cells.clear();
+  offsets.clear();
+  volumes.clear();
+  weights.clear();
+  members_.clear();
+  if (known_.size() < max_known) return;
+  known_.clear();
+  places_.clear();
+}
+
+void CellStar::add(Index vertex, Index cell) {
+  Index& place = places_.of(cell);
+  if (place < 0) {
+    place = static_cast<Index>(known_.size());
+    known_.push_back(geometry_->gradient(cell));
+  }
+  const CellGradient& gradient = known_[place];
+  if (!(gradient.volume > 0)) return;
+  cells.push_back(cell);
+  members_.push_back(place);
+  volumes.push_back(gradient.volume);
+  const Points& vertices = geometry_->vertices();
+  Vector& offset = offsets.emplace_back(vertices.cols());
+  for (Eigen::Index a = 0; a < vertices.cols(); ++a) offset[a] = gradient.centroid[a] - vertices(vertex, a);
+}
+
+std::span<const CellGradient* const> CellStar::gradients() {
+  gradients_.clear();
+  for (const Index member : members_) gradients_.push_back(&known_[member]);
+  return gradients_;
+}
+
+void CellAverage::normalised_star(const CellGradients& cells, Index vertex, CellStar& star) const {
+  star.clear();
+  weigh(cells, vertex, star);
+  const double sum = std::accumulate(star.weights.begin(), star.weights.end(), 0.0);
+  for (double& weight : star.weights) weight /= sum;
+}
+
+CellWeights CellAverage::weights(const CellGradients& cells, Index vertex) const {
+  CellStar star(cells);
+  normalised_star(cells, vertex, star);
+  return {std::move(star.cells), std::move(star.weights)};
+}
+
 Reconstruction CellAverage::reconstruct(const CellGradients& cells, std::span<const Index> vertices) const {
   Reconstruction result;
-  result.stencils = assemble_rows(cells.gdim(), vertices, [&](Index vertex, StencilRow& row) {
-    const CellWeights average = weights(cells, vertex);
-    compose_row(cells, vertex, average.cells, average.weights, row);
-    row.diagnostics.rule = average.cells.empty() ? StencilRule::none : StencilRule::average;
-    row.diagnostics.num_points = static_cast<Index>(average.cells.size());
+  result.stencils = assemble_rows_with_workers(cells.gdim(), vertices, [&]() -> RowMaker {
+    return [this, &cells, star = CellStar(cells)](Index vertex, StencilRow& row) mutable {
+      normalised_star(cells, vertex, star);
+      compose_row(cells, vertex, star.cells, star.gradients(), star.weights, row);
+      row.diagnostics.rule = star.cells.empty() ? StencilRule::none : StencilRule::average;
+      row.diagnostics.num_points = static_cast<Index>(star.cells.size());
+    };
   });
   return result;
 }
 
-CellWeights UnweightedAverage::weights(const CellGradients& cells, Index vertex) const {
-  const std::vector<UsableCell> usable = adjacent_cells(cells, vertex);
-  return normalised(usable, std::vector<double>(usable.size(), 1.0));
+void UnweightedAverage::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
+  add_adjacent(cells, vertex, star);
+  star.weights.assign(star.cells.size(), 1.0);
 }
 
-CellWeights InverseDistance::weights(const CellGradients& cells, Index vertex) const {
-  const std::vector<UsableCell> usable = adjacent_cells(cells, vertex);
-  std::vector<double> raw;
-  for (const UsableCell& cell : usable) raw.push_back(1 / cell.offset.norm());
-  return normalised(usable, raw);
+void InverseDistance::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
+  add_adjacent(cells, vertex, star);
+  weigh_by_distance(star);
 }
 
-CellWeights VolumeAverage::weights(const CellGradients& cells, Index vertex) const {
-  const std::vector<UsableCell> usable = adjacent_cells(cells, vertex);
-  std::vector<double> raw;
-  for (const UsableCell& cell : usable) raw.push_back(cell.volume);
-  return normalised(usable, raw);
+void VolumeAverage::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
+  add_adjacent(cells, vertex, star);
+  star.weights = star.volumes;
 }
 
 ChandrashekarGarg::ChandrashekarGarg(const ChandrashekarGargOptions& options) : options_(options) {
   if (!(options.epsilon >= 0)) raise("chandrashekar_garg: epsilon {}: expected a number >= 0", options.epsilon);
 }
 
-CellWeights ChandrashekarGarg::weights(const CellGradients& cells, Index vertex) const {
-  return consistent_weights(adjacent_cells(cells, vertex), options_.epsilon, vertex);
+void ChandrashekarGarg::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
+  add_adjacent(cells, vertex, star);
+  weigh_consistently(cells.gdim(), options_.epsilon, vertex, star);
 }
 
 Knn::Knn(const KnnOptions& options) : options_(options) {
@@ -126,15 +166,15 @@ Knn::Knn(const KnnOptions& options) : options_(options) {
   if (!(options.epsilon >= 0)) raise("knn: epsilon {}: expected a number >= 0", options.epsilon);
 }
 
-CellWeights Knn::weights(const CellGradients& cells, Index vertex) const {
-  std::vector<UsableCell> usable = adjacent_cells(cells, vertex);
+void Knn::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
+  add_adjacent(cells, vertex, star);
   // Rings of cells that share a vertex, so that the choice never jumps a gap of the mesh: grown until they hold k
   // further cells, then once more, so that a near cell of the next ring is not missed.
   const std::span<const Index> adjacent = cells.cells_of(vertex);
   std::vector<Index> found(adjacent.begin(), adjacent.end()), ring = found, next;
-  std::vector<UsableCell> further;
+  CellStar further(cells);
   for (bool last = false; !last && !ring.empty();) {
-    last = static_cast<int>(further.size()) >= options_.k;
+    last = static_cast<int>(further.cells.size()) >= options_.k;
     next.clear();
     for (Index cell : ring)
       for (Index v : cells.vertices_of(cell))
@@ -143,10 +183,7 @@ CellWeights Knn::weights(const CellGradients& cells, Index vertex) const {
     next.erase(std::unique(next.begin(), next.end()), next.end());
     ring.clear();
     std::set_difference(next.begin(), next.end(), found.begin(), found.end(), std::back_inserter(ring));
-    for (Index cell : ring) {
-      UsableCell candidate = usable_cell(cells, vertex, cell);
-      if (candidate.volume > 0) further.push_back(candidate);
-    }
+    for (Index cell : ring) further.add(vertex, cell);
     const auto middle = static_cast<std::ptrdiff_t>(found.size());
     found.insert(found.end(), ring.begin(), ring.end());
     std::inplace_merge(found.begin(), found.begin() + middle, found.end());
@@ -155,15 +192,15 @@ CellWeights Knn::weights(const CellGradients& cells, Index vertex) const {
   double cut = std::numeric_limits<double>::infinity();
   if (options_.k == 0) {
     cut = -1;
-  } else if (static_cast<int>(further.size()) > options_.k) {
+  } else if (static_cast<int>(further.cells.size()) > options_.k) {
     std::vector<double> distances;
-    for (const UsableCell& cell : further) distances.push_back(cell.offset.squaredNorm());
+    for (const Vector& offset : further.offsets) distances.push_back(offset.squaredNorm());
     std::nth_element(distances.begin(), distances.begin() + (options_.k - 1), distances.end());
     cut = distances[options_.k - 1] * (1 + 2 * distance_tie);
   }
-  for (const UsableCell& cell : further)
-    if (cell.offset.squaredNorm() <= cut) usable.push_back(cell);
-  return consistent_weights(usable, options_.epsilon, vertex);
+  for (std::size_t i = 0; i < further.cells.size(); ++i)
+    if (further.offsets[i].squaredNorm() <= cut) star.add(vertex, further.cells[i]);
+  weigh_consistently(cells.gdim(), options_.epsilon, vertex, star);
 }
 
 }  // namespace halfgrad

@@ -1,7 +1,10 @@
 // Weighted means of cell gradients: the paper's family of reconstructors.
 #pragma once
 
+#include <vector>
+
 #include "framework/vertex_gradient_reconstructor.hpp"
+#include "reconstruction/places.hpp"
 
 namespace halfgrad {
 
@@ -11,31 +14,63 @@ struct CellWeights {
   std::vector<double> weights;  ///< w'_k, sum to one; empty where no cell is usable
 };
 
-/// A reconstructor of the form F_v = Σ_k w'_k F_k. Derived classes give the weights; composition with the cells'
-/// gradients to a vertex stencil is shared. Degenerate cells (volume 0) carry no weight.
+/// The cells of which one vertex takes the mean. Serves vertex after vertex: it keeps its storage and the geometry of
+/// the cells it met last, of which neighbouring vertices share most.
+class CellStar {
+ public:
+  std::vector<Index> cells;
+  std::vector<Vector> offsets;  ///< centroid − vertex
+  std::vector<double> volumes;
+  std::vector<double> weights;  ///< one a cell
+
+  explicit CellStar(const CellGradients& geometry) : geometry_(&geometry), places_(16) {}
+  void clear();
+  /// Adds a cell, seen from the vertex, unless it is degenerate.
+  void add(Index vertex, Index cell);
+  /// The gradients of the cells, valid until cells are added.
+  std::span<const CellGradient* const> gradients();
+
+ private:
+  static constexpr std::size_t max_known = 4096;  // some 1.3 MB
+
+  const CellGradients* geometry_;
+  std::vector<CellGradient> known_;
+  Places places_;               // of cells in known_
+  std::vector<Index> members_;  // of known_, one a cell
+  std::vector<const CellGradient*> gradients_;
+};
+
+/// A reconstructor of the form F_v = Σ_k w'_k F_k. Derived classes choose and weigh the cells; composition with the
+/// cells' gradients to a vertex stencil is shared. Degenerate cells (volume 0) carry no weight.
 class CellAverage : public VertexGradientReconstructor {
  public:
   Reconstruction reconstruct(const CellGradients& cells, std::span<const Index> vertices) const final;
   /// Normalised weights of one vertex.
-  virtual CellWeights weights(const CellGradients& cells, Index vertex) const = 0;
+  CellWeights weights(const CellGradients& cells, Index vertex) const;
+
+ private:
+  /// Fills a cleared star; no cells where none is usable. Weights may have any sum but zero.
+  virtual void weigh(const CellGradients& cells, Index vertex, CellStar& star) const = 0;
+
+  void normalised_star(const CellGradients& cells, Index vertex, CellStar& star) const;
 };
 
 /// w_k = 1.
 class UnweightedAverage final : public CellAverage {
- public:
-  CellWeights weights(const CellGradients& cells, Index vertex) const override;
+ private:
+  void weigh(const CellGradients& cells, Index vertex, CellStar& star) const override;
 };
 
 /// w_k = volume of cell k.
 class VolumeAverage final : public CellAverage {
- public:
-  CellWeights weights(const CellGradients& cells, Index vertex) const override;
+ private:
+  void weigh(const CellGradients& cells, Index vertex, CellStar& star) const override;
 };
 
 /// w_k = 1 / |centroid of cell k − vertex|.
 class InverseDistance final : public CellAverage {
- public:
-  CellWeights weights(const CellGradients& cells, Index vertex) const override;
+ private:
+  void weigh(const CellGradients& cells, Index vertex, CellStar& star) const override;
 };
 
 struct ChandrashekarGargOptions {
@@ -47,9 +82,9 @@ struct ChandrashekarGargOptions {
 class ChandrashekarGarg final : public CellAverage {
  public:
   explicit ChandrashekarGarg(const ChandrashekarGargOptions& options = {});
-  CellWeights weights(const CellGradients& cells, Index vertex) const override;
 
  private:
+  void weigh(const CellGradients& cells, Index vertex, CellStar& star) const override;
   ChandrashekarGargOptions options_;
 };
 
@@ -63,9 +98,9 @@ struct KnnOptions {
 class Knn final : public CellAverage {
  public:
   explicit Knn(const KnnOptions& options = {});
-  CellWeights weights(const CellGradients& cells, Index vertex) const override;
 
  private:
+  void weigh(const CellGradients& cells, Index vertex, CellStar& star) const override;
   KnnOptions options_;
 };
 

@@ -53,28 +53,20 @@ Spr::Spr(const SprOptions& options) : options_(options) {
   if (options.rings < 1) raise("spr: rings {}: expected a whole number >= 1", options.rings);
 }
 
-CellWeights Spr::weights(const CellGradients& cells, Index vertex) const {
+void Spr::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
   const int rings = options_.rings + (cells.on_boundary(vertex) ? 1 : 0);
-  CellWeights result;
-  std::vector<Vector> offsets;
-  for (Index cell : cells_within(cells, vertex, rings)) {
-    const CellGradient gradient = cells.gradient(cell);
-    if (!(gradient.volume > 0)) continue;
-    result.cells.push_back(cell);
-    offsets.push_back(gradient.centroid - cells.vertices().row(vertex).transpose());
-  }
-  const auto count = static_cast<Eigen::Index>(offsets.size());
-  if (count == 0) return result;
+  for (Index cell : cells_within(cells, vertex, rings)) star.add(vertex, cell);
+  const auto count = static_cast<Eigen::Index>(star.cells.size());
+  if (count == 0) return;
   MatrixXd centroids(count, cells.gdim());
-  for (Eigen::Index k = 0; k < count; ++k) centroids.row(k) = offsets[k].transpose();
+  for (Eigen::Index k = 0; k < count; ++k) centroids.row(k) = star.offsets[k].transpose();
   // The mean first and the slope about it: the weights sum to one whatever the rank.
   const Eigen::RowVectorXd mean = centroids.colwise().mean();
   centroids.rowwise() -= mean;
   const PseudoInverse slope = pseudo_inverse(centroids, undetermined * centroids.norm());
   const Eigen::RowVectorXd weights =
       Eigen::RowVectorXd::Constant(count, 1.0 / static_cast<double>(count)) - mean * slope.matrix;
-  result.weights.assign(weights.begin(), weights.end());
-  return result;
+  star.weights.assign(weights.begin(), weights.end());
 }
 
 Ppr::Ppr(const PprOptions& options) : options_(options) {

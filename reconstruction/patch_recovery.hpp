@@ -15,9 +15,9 @@ struct SprOptions {
 class Spr final : public CellAverage {
  public:
   explicit Spr(const SprOptions& options = {});
-  CellWeights weights(const CellGradients& cells, Index vertex) const override;
 
  private:
+  void weigh(const CellGradients& cells, Index vertex, CellStar& star) const override;
   SprOptions options_;
 };
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "framework/parallel.hpp"
+#include "reconstruction/places.hpp"
 
 namespace halfgrad {
 
@@ -45,6 +46,44 @@ class WorkerPool {
   std::vector<RowMaker> idle_;
 };
 
+// The rows of some vertices, in a table that keeps its storage.
+void fill(std::span<const Index> vertices, const RowMaker& make_row, StencilRow& row, GradientStencilTable& chunk) {
+  chunk.offsets.assign(1, 0);
+  chunk.neighbors.clear();
+  chunk.weights.clear();
+  chunk.hessian_weights.clear();
+  chunk.diagnostics.clear();
+  for (const Index vertex : vertices) {
+    row.clear();
+    make_row(vertex, row);
+    chunk.neighbors.insert(chunk.neighbors.end(), row.neighbors.begin(), row.neighbors.end());
+    chunk.weights.insert(chunk.weights.end(), row.weights.begin(), row.weights.end());
+    chunk.hessian_weights.insert(chunk.hessian_weights.end(), row.hessian_weights.begin(), row.hessian_weights.end());
+    chunk.offsets.push_back(static_cast<Offset>(chunk.neighbors.size()));
+    chunk.diagnostics.push_back(row.diagnostics);
+  }
+}
+
+void append(const GradientStencilTable& chunk, GradientStencilTable& table) {
+  const Offset base = table.num_entries();
+  for (std::size_t r = 1; r < chunk.offsets.size(); ++r) table.offsets.push_back(base + chunk.offsets[r]);
+  const auto join = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  join(table.neighbors, chunk.neighbors);
+  join(table.weights, chunk.weights);
+  join(table.hessian_weights, chunk.hessian_weights);
+  join(table.diagnostics, chunk.diagnostics);
+}
+
+// Room for all rows if they are at most twice as long as the first ones, which may lie on a boundary. Room that is not
+// used is never touched.
+void reserve_for(std::int64_t num_rows, std::int64_t num_made, GradientStencilTable& table) {
+  if (num_made >= num_rows) return;
+  const double growth = 2 * static_cast<double>(num_rows) / static_cast<double>(num_made);
+  for (auto* weights : {&table.weights, &table.hessian_weights})
+    weights->reserve(static_cast<std::size_t>(growth * static_cast<double>(weights->size())));
+  table.neighbors.reserve(static_cast<std::size_t>(growth * static_cast<double>(table.neighbors.size())));
+}
+
 }  // namespace
 
 GradientStencilTable assemble_rows(int gdim, std::span<const Index> vertices, const RowMaker& make_row) {
@@ -53,66 +92,78 @@ GradientStencilTable assemble_rows(int gdim, std::span<const Index> vertices, co
 
 GradientStencilTable assemble_rows_with_workers(int gdim, std::span<const Index> vertices,
                                                 const std::function<RowMaker()>& make_worker) {
-  // Fixed chunks, each with its own table, joined in order: the same bits for any schedule.
-  constexpr std::int64_t chunk_size = 64;
+  // Fixed chunks, each with its own table, joined in order: the same bits for any schedule. A wave of chunks at a time,
+  // so that beside the result there is never more than a wave.
+  constexpr std::int64_t chunk_size = 64, wave_size = 64;
   const std::int64_t num_vertices = static_cast<std::int64_t>(vertices.size());
   const std::int64_t num_chunks = (num_vertices + chunk_size - 1) / chunk_size;
-  std::vector<GradientStencilTable> chunks(num_chunks);
+  std::vector<GradientStencilTable> chunks(std::min(num_chunks, wave_size));
   WorkerPool workers(make_worker);
-  parallel_for(num_chunks, 1, [&](std::int64_t begin, std::int64_t end) {
-    RowMaker make_row = workers.take();
-    StencilRow row;
-    for (std::int64_t c = begin; c < end; ++c) {
-      GradientStencilTable& chunk = chunks[c];
-      for (std::int64_t r = c * chunk_size; r < std::min((c + 1) * chunk_size, num_vertices); ++r) {
-        row.clear();
-        make_row(vertices[r], row);
-        chunk.neighbors.insert(chunk.neighbors.end(), row.neighbors.begin(), row.neighbors.end());
-        chunk.weights.insert(chunk.weights.end(), row.weights.begin(), row.weights.end());
-        chunk.hessian_weights.insert(chunk.hessian_weights.end(), row.hessian_weights.begin(),
-                                     row.hessian_weights.end());
-        chunk.offsets.push_back(static_cast<Offset>(chunk.neighbors.size()));
-        chunk.diagnostics.push_back(row.diagnostics);
-      }
-    }
-    workers.give_back(std::move(make_row));
-  });
   GradientStencilTable table;
   table.gdim = gdim;
   table.vertices.assign(vertices.begin(), vertices.end());
-  for (GradientStencilTable& chunk : chunks) {
-    const Offset base = table.num_entries();
-    for (std::size_t r = 1; r < chunk.offsets.size(); ++r) table.offsets.push_back(base + chunk.offsets[r]);
-    const auto append = [](auto& to, auto& from) {
-      to.insert(to.end(), from.begin(), from.end());
-      from = {};
-    };
-    append(table.neighbors, chunk.neighbors);
-    append(table.weights, chunk.weights);
-    append(table.hessian_weights, chunk.hessian_weights);
-    append(table.diagnostics, chunk.diagnostics);
+  table.offsets.reserve(vertices.size() + 1);
+  table.diagnostics.reserve(vertices.size());
+  for (std::int64_t wave = 0; wave < num_chunks; wave += wave_size) {
+    const std::int64_t num_in_wave = std::min(wave_size, num_chunks - wave);
+    parallel_for(num_in_wave, 1, [&](std::int64_t begin, std::int64_t end) {
+      RowMaker make_row = workers.take();
+      StencilRow row;
+      for (std::int64_t c = begin; c < end; ++c) {
+        const std::int64_t first = (wave + c) * chunk_size;
+        fill(vertices.subspan(first, std::min(chunk_size, num_vertices - first)), make_row, row, chunks[c]);
+      }
+      workers.give_back(std::move(make_row));
+    });
+    for (std::int64_t c = 0; c < num_in_wave; ++c) append(chunks[c], table);
+    if (wave == 0) reserve_for(num_vertices, num_in_wave * chunk_size, table);
   }
   return table;
 }
 
 void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
-                 std::span<const double> cell_weights, StencilRow& row) {
-  const int gdim = cells.gdim();
-  for (Index cell : cell_numbers)
-    for (Index v : cells.vertices_of(cell))
-      if (v != vertex) row.neighbors.push_back(v);
-  std::sort(row.neighbors.begin(), row.neighbors.end());
-  row.neighbors.erase(std::unique(row.neighbors.begin(), row.neighbors.end()), row.neighbors.end());
-  row.weights.assign(row.neighbors.size() * gdim, 0.0);
+                 std::span<const CellGradient* const> gradients, std::span<const double> cell_weights,
+                 StencilRow& row) {
+  const auto gdim = static_cast<std::size_t>(cells.gdim());
+  // Neighbours as they are met, and their sums; sorted at the end.
+  Places places(32);
+  std::vector<std::pair<Index, Index>> met;
+  std::vector<double> sums;
+  met.reserve(32);
+  sums.reserve(32 * gdim);
   for (std::size_t k = 0; k < cell_numbers.size(); ++k) {
-    const CellGradient cell = cells.gradient(cell_numbers[k]);
-    const std::span<const Index> nodes = cells.vertices_of(cell_numbers[k]);
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      if (nodes[i] == vertex) continue;
-      const auto entry = std::lower_bound(row.neighbors.begin(), row.neighbors.end(), nodes[i]) - row.neighbors.begin();
-      for (int a = 0; a < gdim; ++a) row.weights[entry * gdim + a] += cell_weights[k] * cell.weights(i, a);
+    const double* weight = gradients[k]->weights.data();
+    for (const Index v : cells.vertices_of(cell_numbers[k])) {
+      if (v != vertex) {
+        Index& place = places.of(v);
+        if (place < 0) {
+          place = static_cast<Index>(met.size());
+          met.emplace_back(v, place);
+          sums.resize(sums.size() + gdim, 0.0);
+        }
+        double* sum = sums.data() + static_cast<std::size_t>(place) * gdim;
+        for (std::size_t a = 0; a < gdim; ++a) sum[a] += cell_weights[k] * weight[a];
+      }
+      weight += gdim;
     }
   }
+  std::sort(met.begin(), met.end());
+  row.neighbors.resize(met.size());
+  row.weights.resize(met.size() * gdim);
+  for (std::size_t n = 0; n < met.size(); ++n) {
+    row.neighbors[n] = met[n].first;
+    const auto place = static_cast<std::size_t>(met[n].second);
+    for (std::size_t a = 0; a < gdim; ++a) row.weights[n * gdim + a] = sums[place * gdim + a];
+  }
+}
+
+void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
+                 std::span<const double> cell_weights, StencilRow& row) {
+  std::vector<CellGradient> gradients;
+  std::vector<const CellGradient*> pointers;
+  for (const Index cell : cell_numbers) gradients.push_back(cells.gradient(cell));
+  for (const CellGradient& gradient : gradients) pointers.push_back(&gradient);
+  compose_row(cells, vertex, cell_numbers, pointers, cell_weights, row);
 }
 
 }  // namespace halfgrad

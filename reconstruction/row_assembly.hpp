@@ -37,4 +37,8 @@ GradientStencilTable assemble_rows_with_workers(int gdim, std::span<const Index>
 void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
                  std::span<const double> cell_weights, StencilRow& row);
 
+/// The same where the cells' gradients are at hand.
+void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
+                 std::span<const CellGradient* const> gradients, std::span<const double> cell_weights, StencilRow& row);
+
 }  // namespace halfgrad

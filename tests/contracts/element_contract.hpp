@@ -87,6 +87,32 @@ TYPED_TEST_P(ElementContract, PolynomialsAreTheShapeFunctions) {
   }
 }
 
+TYPED_TEST_P(ElementContract, CubeCollapsesOntoTheCell) {
+  using E = TypeParam;
+  if constexpr (CubeElement<E>) {
+    std::mt19937 random(6);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    for (int n = 0; n < 200; ++n) {
+      std::array<double, E::dim> u;
+      for (double& coordinate : u) coordinate = uniform(random);
+      NodeVector<E> beta = NodeVector<E>::Zero();
+      for (std::size_t c = 0; c < std::size_t{1} << E::dim; ++c) {
+        double weight = 1;
+        for (std::size_t k = 0; k < u.size(); ++k) weight *= c >> k & 1 ? u[k] : 1 - u[k];
+        beta[E::cube_nodes[c]] += weight;
+      }
+      const ReferencePoint<E> xi = E::nodes().transpose() * beta;
+      EXPECT_TRUE(contains<E>(xi, 1e-14));
+      EXPECT_LT((E::shape(xi) - beta).cwiseAbs().maxCoeff(), 1e-13);
+    }
+    // Onto: no node is left out.
+    for (int i = 0; i < E::num_nodes; ++i)
+      EXPECT_EQ(std::count(E::cube_nodes.begin(), E::cube_nodes.end(), i) > 0, true) << "node " << i;
+  } else {
+    GTEST_SKIP() << TypeParam::name << " is not stated as a cube";
+  }
+}
+
 TYPED_TEST_P(ElementContract, GradientIsTheDerivativeOfShape) {
   std::mt19937 random(2);
   for (int n = 0; n < 50; ++n) {
@@ -195,8 +221,9 @@ TYPED_TEST_P(ElementContract, PhongReproducesQuadraticsFromExactGradients) {
 
 REGISTER_TYPED_TEST_SUITE_P(ElementContract, SatisfiesTheConcept, ShapeIsOneAtItsNodeAndZeroAtOthers,
                             WeightsSumToOneAndReproducePosition, PolynomialsAreTheShapeFunctions,
-                            GradientIsTheDerivativeOfShape, MarginIsZeroAtNodesAndPositiveAtTheCenter,
-                            FacetsLieOnTheBoundaryAndCoverEveryNode, ReferenceVolumeIsTheShareOfTheNodesBox,
-                            InverseMapReturnsToThePoint, PhongReproducesQuadraticsFromExactGradients);
+                            CubeCollapsesOntoTheCell, GradientIsTheDerivativeOfShape,
+                            MarginIsZeroAtNodesAndPositiveAtTheCenter, FacetsLieOnTheBoundaryAndCoverEveryNode,
+                            ReferenceVolumeIsTheShareOfTheNodesBox, InverseMapReturnsToThePoint,
+                            PhongReproducesQuadraticsFromExactGradients);
 
 }  // namespace halfgrad

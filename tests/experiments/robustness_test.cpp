@@ -151,9 +151,8 @@ TEST(NeverWorseThanLinear, OnThinMeshes) {
   expect_never_worse(lattice({6, 6, 1}, 0.2), "jittered slab");
   expect_never_worse(lattice({8, 1, 1}, 0), "strip");
   const Mesh cube = lattice({1, 1, 1}, 0);
-  // Five values tell no rule what a quadratic does between them: fields fall on either side of 1, by a few percent.
-  EXPECT_GE(worst_gain(first_cells(cube, 2), wide), 0.95);
-  expect_never_worse(first_cells(cube, 1), "one cell");
+  // A few cells: what their vertices do not determine must not be made up.
+  for (int count = 1; count <= 6; ++count) expect_never_worse(first_cells(cube, count), "cells of one cube");
 }
 
 TEST(AbsoluteSums, StayBelowTwentyOnGoodMeshes) {

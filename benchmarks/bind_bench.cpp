@@ -1,0 +1,116 @@
+// bind_bench WORKLOAD ROUNDS MAX_POINTS [THREADS]: times location, bind and the parts of bind with the reconstructor
+// chandrashekar_garg, one JSON line each. Every round runs each operation once in turn; compare numbers of one round
+// only. The line `report` has the size of the binding, and how much the first bind added to the process at its peak.
+#include <fmt/format.h>
+#include <malloc.h>
+#include <tbb/global_control.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <utility>
+
+#include "benchmarks/workload.hpp"
+#include "framework/cell_locator.hpp"
+#include "framework/error.hpp"
+#include "framework/interpolant.hpp"
+#include "reconstruction/cell_averages.hpp"
+
+namespace halfgrad::benchmarks {
+namespace {
+
+// A size of the process in bytes; 0 where the system does not tell.
+std::int64_t process_bytes(const std::string& name) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with(name)) return 1024 * std::atoll(line.c_str() + name.size());
+  return 0;
+}
+
+class Stopwatch {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    return std::chrono::duration<double>(now - std::exchange(start_, now)).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+void run(const std::string& name, int rounds, std::int64_t max_points, int threads) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+  const Workload workload =
+      name.ends_with(".bin") ? read_workload(name, max_points) : lattice_workload(name, max_points);
+  const Mesh& mesh = workload.mesh;
+  // Points on the surface of a workload may be outside by a rounding.
+  EmbedOptions nearest;
+  nearest.outside = Outside::nearest;
+  struct {
+    double embed, active, incidence, reconstruct, pack;
+  } parts{};
+  const auto bind = [&] {
+    Stopwatch watch;
+    const Embedding embedding = embed(mesh, workload.points, nearest);
+    parts.embed = watch.lap();
+    const std::vector<Index> active = active_vertices(mesh, embedding);
+    parts.active = watch.lap();
+    const CellGradients cells(mesh);
+    parts.incidence = watch.lap();
+    const Reconstruction stencils = ChandrashekarGarg().reconstruct(cells, active);
+    parts.reconstruct = watch.lap();
+    Interpolant<float> interpolant(mesh, embedding, named_rule("phong"), &stencils);
+    parts.pack = watch.lap();
+    return interpolant;
+  };
+
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << 5 << std::endl;  // the peak starts anew
+  const std::int64_t before = process_bytes("VmRSS:");
+  const BindReport report = bind().report();
+  const std::int64_t peak = process_bytes("VmHWM:") - before;
+  const Offset allowed = 20 * static_cast<Offset>(report.num_points) +
+                         200 * static_cast<Offset>(report.num_active_cells) + 24 * report.num_stencil_entries;
+  fmt::print(
+      "{{\"impl\":\"halfgrad\",\"op\":\"report\",\"n\":{},\"active_cells\":{},\"active_vertices\":{},"
+      "\"stencil_entries\":{},\"bytes\":{},\"bytes_allowed\":{},\"peak_of_bind\":{}}}\n",
+      report.num_points, report.num_active_cells, report.num_active_vertices, report.num_stencil_entries, report.bytes,
+      allowed, peak);
+
+  for (int round = 0; round < rounds; ++round) {
+    Stopwatch watch;
+    locate(mesh, workload.points, nearest.tolerance);
+    const double located = watch.lap();
+    bind();
+    const double bound = watch.lap();
+    const std::pair<const char*, double> operations[] = {{"locate", located},
+                                                         {"bind", bound},
+                                                         {"bind.embed", parts.embed},
+                                                         {"bind.active_vertices", parts.active},
+                                                         {"bind.incidence", parts.incidence},
+                                                         {"bind.reconstruct", parts.reconstruct},
+                                                         {"bind.pack", parts.pack}};
+    for (const auto& [operation, time] : operations)
+      fmt::print("{{\"impl\":\"halfgrad\",\"op\":\"{}\",\"seconds\":{:.9g},\"n\":{},\"round\":{}}}\n", operation, time,
+                 report.num_points, round);
+    std::fflush(stdout);
+  }
+}
+
+}  // namespace
+}  // namespace halfgrad::benchmarks
+
+int main(int argc, char** argv) {
+  if (argc < 4 || argc > 5) {
+    fmt::print(stderr, "usage: bind_bench WORKLOAD.bin|ELEMENT:CELLS ROUNDS MAX_POINTS [THREADS]\n");
+    return 2;
+  }
+  try {
+    halfgrad::benchmarks::run(argv[1], std::atoi(argv[2]), std::atoll(argv[3]), argc == 5 ? std::atoi(argv[4]) : 1);
+  } catch (const halfgrad::Error& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 2;
+  }
+}
