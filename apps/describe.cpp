@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "experiments/stress_mesh.hpp"
 #include "framework/error.hpp"
 #include "framework/interpolation_rule.hpp"
 #include "framework/json_reader.hpp"
@@ -246,6 +247,8 @@ std::vector<std::string> known_words(std::string_view command, std::string_view 
     words = {"float", "double"};
   } else if (option == "--as") {
     words = {"matrix", "stencils", "bones"};
+  } else if (option == "--element") {
+    for (const std::string_view name : stress_elements()) words.emplace_back(name);
   } else if (command == "list" && option == "what") {
     words = {"elements", "reconstructors", "interpolants", "fields"};
   } else if (command == "describe" && option == "format") {

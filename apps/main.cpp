@@ -15,6 +15,7 @@
 #include "apps/listings.hpp"
 #include "experiments/experiment.hpp"
 #include "experiments/merged_report.hpp"
+#include "experiments/stress.hpp"
 #include "framework/error.hpp"
 #include "framework/json_reader.hpp"
 #include "framework/version.hpp"
@@ -69,6 +70,24 @@ int run(const RunCommand& command, ProgressMode mode, bool quiet) {
   }
   if (result.all_expectations_hold()) return all_well;
   fmt::print(stderr, "halfgrad: an expectation of {} does not hold\n", command.config.string());
+  return expectation_failed;
+}
+
+int stress(StressOptions options, const std::filesystem::path& out, ProgressMode mode, bool quiet) {
+  constexpr std::int64_t steps = 1000;
+  StressResult result;
+  {
+    Progress line(quiet ? ProgressMode::never : mode, "stress", steps, "steps of a thousand");
+    options.progress = [&](double fraction) { line.advance(static_cast<std::int64_t>(fraction * steps)); };
+    result = run_stress(options);
+  }
+  const std::vector<std::string> files = out.empty() ? std::vector<std::string>() : write_stress_report(result, out);
+  if (!quiet) {
+    fmt::print("{}", stress_summary(result));
+    for (const std::string& file : files) fmt::print("written: {}\n", file);
+  }
+  if (result.passed()) return all_well;
+  fmt::print(stderr, "halfgrad: {} properties failed under stress\n", result.num_failures);
   return expectation_failed;
 }
 
@@ -199,7 +218,10 @@ int dispatch(int argc, char** argv) {
       ->add_option("--frames", options.frames,
                    "Deformed vertices: .npy .pc2 .pvd, or a pattern of files (x.%04d.vtu, frames/*.vtu)")
       ->required();
-  deform_app->add_option("--out", options.out, "Output: .npy .pc2 .obj (name.%04d.obj) .pvd")->required();
+  deform_app
+      ->add_option("--out", options.out,
+                   "Output: .npy .pc2 .obj .pvd; name.%04d.obj or name.%04d.npy for one file a frame")
+      ->required();
   deform_app
       ->add_option("--tolerance", options.tolerance,
                    "Length: cells that differ from linear by less are evaluated linearly")
@@ -246,6 +268,16 @@ int dispatch(int argc, char** argv) {
   report_app->add_option("folders", result_folders, "Folders that halfgrad run wrote")->required();
   report_app->add_option("--out", report_file, "The page, HTML")->capture_default_str();
   report_app->footer("Example: halfgrad report out/lattice out/jittered --out out/both.html");
+
+  StressOptions stress_options;
+  std::filesystem::path stress_out;
+  CLI::App* stress_app = program.add_subcommand("stress", "Try what is promised on random bad meshes");
+  stress_app->add_option("--seed", stress_options.seed, "Seed of the first case")->capture_default_str();
+  stress_app->add_option("--cases", stress_options.num_cases, "Cases an element")->capture_default_str();
+  stress_app->add_option("--minutes", stress_options.minutes, "Stop after so many minutes (default: no limit)");
+  stress_app->add_option("--element", stress_options.elements, "These elements only")->take_all();
+  stress_app->add_option("--out", stress_out, "Folder for stress.json and stress.html (default: none)");
+  stress_app->footer("Example: halfgrad stress --cases 1000 --out out/stress");
 
   ExportOptions map;
   CLI::App* export_app = program.add_subcommand("export", "Write the map from vertices to points for other programs");
@@ -313,6 +345,7 @@ int dispatch(int argc, char** argv) {
     if (!quiet) fmt::print("written: {}\n", report_file.string());
     return all_well;
   }
+  if (stress_app->parsed()) return stress(stress_options, stress_out, mode, quiet);
   if (bind_app->parsed()) {
     save_binding(bind, binding, bind_report, quiet);
     return all_well;

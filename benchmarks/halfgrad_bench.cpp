@@ -137,10 +137,22 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
        [&] { updated.interpolant.update_sorted(moving.next(), updated.out, updated.workspace); }},
       {"phong_near_tenth", frames, [&] { near_tenth.sorted(values); }},
       {"phong_sparse_tenth", frames, [&] { sparse_tenth.sorted(values); }},
+      // Every cell within the tolerance: the most that it can save.
+      {"phong_all_linear", frames,
+       [&] { phong.interpolant.evaluate_sorted(values, phong.out, phong.workspace, {.tolerance = 1e30}); }},
       {"copy", frames, [&] { std::memmove(copy.data(), copied.data(), copy.size() * sizeof(float)); }},
       {"locate", 1, [&] { locate(mesh, workload.points, nearest.tolerance); }},
       {"bind", 1, [&] { bind(); }},
   };
+  // What more threads bring, within one process.
+  const auto on_one_thread = [](auto& frame, const Values<float>& at) {
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    frame.sorted(at);
+  };
+  if (threads > 1) {
+    operations.push_back({"linear_one_thread", frames, [&] { on_one_thread(linear, values); }});
+    operations.push_back({"phong_one_thread", frames, [&] { on_one_thread(phong, values); }});
+  }
   const bool all_tetrahedra = mesh.blocks().size() == 1 && element_name(mesh, 0) == Tetrahedron::name;
   std::optional<ScalarLinear> scalar_linear;
   std::optional<PaperStyle> paper_style;

@@ -32,6 +32,12 @@ void for_each_candidate(const Mesh& mesh, const std::vector<char>& skip, Functio
   });
 }
 
+// Whether two cells have the same vertices: one is the other's double.
+bool same_vertices(const Mesh& mesh, Index a, Index b) {
+  const std::span<const Index> first = mesh.cell_vertices(a), second = mesh.cell_vertices(b);
+  return first.size() == second.size() && std::is_permutation(first.begin(), first.end(), second.begin());
+}
+
 }  // namespace
 
 std::vector<CellFacet> boundary_facets(const Mesh& mesh, const std::vector<char>& skip) {
@@ -50,7 +56,9 @@ std::vector<CellFacet> boundary_facets(const Mesh& mesh, const std::vector<char>
     std::sort(begin, end, [](const Candidate& a, const Candidate& b) { return a.others < b.others; });
     for (auto i = begin; i != end;) {
       const auto j = std::find_if(i, end, [&](const Candidate& other) { return other.others != i->others; });
-      if (j - i == 1) boundary.push_back(i->side);
+      const bool one_cell = std::all_of(
+          i + 1, j, [&](const Candidate& other) { return same_vertices(mesh, i->side.cell, other.side.cell); });
+      if (one_cell) boundary.push_back(i->side);
       i = j;
     }
   }

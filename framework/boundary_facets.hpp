@@ -15,7 +15,8 @@ struct CellFacet {
 /// As a side: the cell of a surface itself.
 inline constexpr int whole_cell = -1;
 
-/// The facets of exactly one cell, where cells marked in `skip` (#cells) count as absent; ascending by cell and facet.
+/// The facets of exactly one cell, where cells marked in `skip` (#cells) count as absent and a cell and its doubles as
+/// one; ascending by cell and facet.
 std::vector<CellFacet> boundary_facets(const Mesh& mesh, const std::vector<char>& skip);
 
 }  // namespace halfgrad

@@ -8,6 +8,7 @@
 
 #include "framework/cell_extent.hpp"
 #include "framework/mesh.hpp"
+#include "framework/refined_inverse.hpp"
 
 namespace halfgrad {
 
@@ -41,7 +42,7 @@ CellGradient cell_gradient(const NodeMatrix<E>& positions) {
     return result;
   }
   result.volume = std::abs(determinant) * E::reference_volume;
-  result.weights = derivative * jacobian.inverse();
+  result.weights = derivative * refined_inverse<E::dim>(jacobian);
   return result;
 }
 

@@ -56,9 +56,9 @@ Extrapolation<E> extrapolate(const InverseMap<E>& map, const ReferencePoint<E>& 
     const auto jacobian = map.jacobian(xi);
     const double determinant = jacobian.determinant();
     if (inward < 1 && !(std::abs(determinant) > 1e-8 * jacobian.colwise().norm().prod())) continue;
-    const auto inverse = jacobian.inverse().eval();
-    ReferencePoint<E> offset = inverse * map.difference(position, xi);
-    offset += inverse * (map.difference(position, xi) - jacobian * offset);
+    const Eigen::FullPivLU<Eigen::Matrix<double, E::dim, E::dim>> solver(jacobian);
+    ReferencePoint<E> offset = solver.solve(map.difference(position, xi));
+    offset += solver.solve(map.difference(position, xi) - jacobian * offset);
     return {xi, offset};
   }
   return {closest, ReferencePoint<E>::Zero()};
@@ -67,13 +67,14 @@ Extrapolation<E> extrapolate(const InverseMap<E>& map, const ReferencePoint<E>& 
 struct Nearest {
   Index cell;
   double distance;
-  Vector xi, offset;
+  Vector closest;     // ξ of the closest point
+  Vector xi, offset;  // of extrapolate()
   bool affine;
 };
 
 Nearest nearest(const Mesh& mesh, const NearestCell& search, const Vector& position) {
   const NearestCell::Result found = search.find(position);
-  Nearest result{found.side.cell, std::sqrt(found.point.squared_distance), {}, {}, false};
+  Nearest result{found.side.cell, std::sqrt(found.point.squared_distance), {}, {}, {}, false};
   with_cell(mesh, result.cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
     const Facet& facet = E::facets[found.side.facet];
     ReferencePoint<E> closest = ReferencePoint<E>::Zero();
@@ -81,6 +82,7 @@ Nearest nearest(const Mesh& mesh, const NearestCell& search, const Vector& posit
       closest += found.point.weights[i] * E::nodes().row(facet.nodes[i]).transpose();
     const InverseMap<E> map(node_positions(mesh, block, row));
     const Extrapolation<E> extrapolation = extrapolate<E>(map, position, closest);
+    result.closest = closest;
     result.xi = extrapolation.xi;
     result.offset = extrapolation.offset;
     result.affine = map.affine();
@@ -147,8 +149,9 @@ Embedding embed(const Mesh& mesh, const Points& points, const EmbedOptions& opti
     const bool on_boundary = at.distance <= options.tolerance * diagonal;
     if (on_boundary || options.outside != Outside::mark) {
       result.cells[p] = at.cell;
-      // An affine cell takes the rest of the way in ξ itself; elsewhere the move is below the tolerance.
-      result.local.row(p) = (on_boundary && at.affine ? Vector(at.xi + at.offset) : at.xi).transpose();
+      // An affine cell takes the rest of the way in ξ itself; elsewhere the move to the closest point is below the
+      // tolerance.
+      result.local.row(p) = (!on_boundary ? at.xi : at.affine ? Vector(at.xi + at.offset) : at.closest).transpose();
     }
     if (on_boundary) {
       result.status[p] = PointStatus::boundary;

@@ -1,7 +1,7 @@
 #include "framework/gradient_stencils.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
-#include <array>
 
 #include "framework/error.hpp"
 #include "framework/parallel.hpp"
@@ -42,153 +42,72 @@ Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const V
   return apply_weights(table, table.hessian_weights, num_symmetric(table.gdim), values);
 }
 
-namespace {
-
-// 1 − w falls with the sixth power of the ratio of roughnesses, which is O(h²) on smooth fields; the choice of 6 and 2
-// is measured in docs/adaptive.md. Two fields without roughness agree on every edge: either serves.
-double sharp_weight(double fitted, double smooth) {
-  const double ratio = fitted > 0 ? fitted / smooth : 0, cubed = ratio * ratio * ratio;
-  return 1 / (1 + 2 * cubed * cubed);
+EdgeMetric edge_metric(const AdaptiveBlend& blend, Index row, int gdim) {
+  EdgeMetric result{SmallMatrix::Zero(gdim, gdim), SmallMatrix::Zero(gdim, gdim)};
+  for (Offset e = blend.edge_offsets[row]; e < blend.edge_offsets[row + 1]; ++e) {
+    const Vector unit = Eigen::Map<const Eigen::VectorXd>(blend.edges.data() + e * gdim, gdim).normalized();
+    result.sum += unit * unit.transpose();
+  }
+  const double mean = result.sum.trace() / gdim;
+  if (mean > 0) result.damped_inverse = (result.sum + 0.1 * mean * SmallMatrix::Identity(gdim, gdim)).inverse();
+  return result;
 }
 
-// The blend for values of `columns` components in a space of `gdim` dimensions, both fixed: a vector instruction serves
-// the components, padded to four.
-template <class Scalar, int gdim, int columns>
-class FixedBlend {
- public:
-  FixedBlend(const Reconstruction& reconstruction, const Values<Scalar>& values)
-      : table_(reconstruction.stencils), blend_(*reconstruction.blend), values_(values) {}
-
-  Values<Scalar> evaluate() const {
-    std::vector<Gradient> sharp(table_.num_rows()), averaged(table_.num_rows());
-    parallel_for(table_.num_rows(), 1024, [&](std::int64_t begin, std::int64_t end) {
-      for (std::int64_t r = begin; r < end; ++r) {
-        sharp[r] = gradient(table_, r);
-        averaged[r] = gradient(blend_.averaging, r);
-      }
-    });
-    Values<Scalar> result(blend_.num_blended, columns * gdim);
-    parallel_for(blend_.num_blended, 1024, [&](std::int64_t begin, std::int64_t end) {
-      for (std::int64_t r = begin; r < end; ++r) {
-        const auto weight = static_cast<Scalar>(weight_of(sharp, averaged, r));
-        for (int a = 0; a < gdim; ++a) {
-          const Four blended = averaged[r][a] + weight * (sharp[r][a] - averaged[r][a]);
-          for (int c = 0; c < columns; ++c) result(r, c * gdim + a) = blended[c];
-        }
-      }
-    });
-    return result;
-  }
-
- private:
-  using Four = Eigen::Array<Scalar, 4, 1>;
-  using Gradient = std::array<Four, gdim>;  // a column of F an axis
-
-  // The components, and in the lanes that are left what follows in memory: a copy lane by lane would stall the load.
-  Four value(Index vertex) const {
-    const Offset begin = static_cast<Offset>(vertex) * columns;
-    if (begin + 4 <= values_.size()) return Eigen::Map<const Four>(values_.data() + begin);
-    Four four = Four::Zero();
-    for (int c = 0; c < columns; ++c) four[c] = values_.data()[begin + c];
-    return four;
-  }
-
-  static Scalar squared_norm(const Four& four) {
-    Scalar sum = 0;
-    for (int c = 0; c < columns; ++c) sum += four[c] * four[c];
-    return sum;
-  }
-
-  Gradient gradient(const GradientStencilTable& table, std::int64_t row) const {
-    Gradient sum;
-    sum.fill(Four::Zero());
-    const Four own = value(table.vertices[row]);
-    for (Offset e = table.offsets[row]; e < table.offsets[row + 1]; ++e) {
-      const Four difference = value(table.neighbors[e]) - own;
-#pragma GCC unroll 3  // keeps the sums in registers at -O2 too
-      for (int a = 0; a < gdim; ++a) sum[a] += difference * static_cast<Scalar>(table.weights[e * gdim + a]);
-    }
-    return sum;
-  }
-
-  double weight_of(const std::vector<Gradient>& sharp, const std::vector<Gradient>& averaged, std::int64_t row) const {
-    Scalar fitted = 0, smooth = 0;
-    const Four own = value(table_.vertices[row]);
-    for (Offset e = blend_.edge_offsets[row]; e < blend_.edge_offsets[row + 1]; ++e) {
-      const Index other = blend_.edge_rows[e];
-      const double* edge = blend_.edges.data() + e * gdim;
-      double squared_length = 0;
-      Four of_sharp = Scalar(-2) * (value(table_.vertices[other]) - own), of_averaged = of_sharp;
-#pragma GCC unroll 3
-      for (int a = 0; a < gdim; ++a) {
-        squared_length += edge[a] * edge[a];
-        const auto component = static_cast<Scalar>(edge[a]);
-        of_sharp += (sharp[row][a] + sharp[other][a]) * component;
-        of_averaged += (averaged[row][a] + averaged[other][a]) * component;
-      }
-      const auto scale = static_cast<Scalar>(1 / squared_length);
-      fitted += squared_norm(of_sharp) * scale;
-      smooth += squared_norm(of_averaged) * scale;
-    }
-    return sharp_weight(fitted, smooth);
-  }
-
-  const GradientStencilTable& table_;
-  const AdaptiveBlend& blend_;
-  const Values<Scalar>& values_;
-};
-
-// The same for any number of columns.
 template <class Scalar>
-Values<Scalar> blend_any(const Reconstruction& reconstruction, const Values<Scalar>& values) {
+Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Values<Scalar>& values) {
   const AdaptiveBlend& blend = reconstruction.blend.value();
   const GradientStencilTable& table = reconstruction.stencils;
-  const Values<Scalar> sharp = apply_stencils(table, values), averaged = apply_stencils(blend.averaging, values);
   const int gdim = table.gdim;
-  const auto roughness = [&](const Values<Scalar>& gradients, Index row) {
-    double sum = 0;
-    for (Offset e = blend.edge_offsets[row]; e < blend.edge_offsets[row + 1]; ++e) {
-      const Index other = blend.edge_rows[e];
-      double squared = 0, length = 0;
-      for (int k = 0; k < gdim; ++k) length += blend.edges[e * gdim + k] * blend.edges[e * gdim + k];
-      for (Eigen::Index c = 0; c < values.cols(); ++c) {
-        double mismatch = -2 * static_cast<double>(values(table.vertices[other], c) - values(table.vertices[row], c));
-        for (int k = 0; k < gdim; ++k)
-          mismatch += static_cast<double>(gradients(row, c * gdim + k) + gradients(other, c * gdim + k)) *
-                      blend.edges[e * gdim + k];
-        squared += mismatch * mismatch;
+  const Eigen::Index columns = values.cols();
+  Values<Scalar> result = apply_stencils(blend.averaging, values);
+  const Values<Scalar> fitted = apply_stencils(table, values), probing = apply_stencils(blend.probing, values);
+  parallel_for(table.num_rows(), 256, [&](std::int64_t begin, std::int64_t end) {
+    Eigen::MatrixXd average, fit, probe, moment;  // #columns × gdim
+    Eigen::VectorXd mismatch;
+    const auto load = [&](const Values<Scalar>& gradients, Index r, Eigen::MatrixXd& into) {
+      into = Eigen::Map<const Values<Scalar>>(gradients.data() + r * columns * gdim, columns, gdim)
+                 .template cast<double>();
+    };
+    for (Index r = static_cast<Index>(begin); r < end; ++r) {
+      load(result, r, average);
+      load(fitted, r, fit);
+      load(probing, r, probe);
+      // Mismatches m of the probing gradient: their squares and Σ m êᵀ tell those of every other gradient.
+      double squares = 0;
+      moment = Eigen::MatrixXd::Zero(columns, gdim);
+      for (Offset e = blend.edge_offsets[r]; e < blend.edge_offsets[r + 1]; ++e) {
+        const Index other = blend.edge_rows[e];
+        const Eigen::Map<const Eigen::VectorXd> edge(blend.edges.data() + e * gdim, gdim);
+        const double length = edge.norm();
+        mismatch = (2 / length) * (values.row(blend.probing.vertices[other]) - values.row(table.vertices[r]))
+                                      .transpose()
+                                      .template cast<double>();
+        const Eigen::Map<const Values<Scalar>> neighbor(probing.data() + other * columns * gdim, columns, gdim);
+        mismatch -= (probe + neighbor.template cast<double>()) * (edge / length);
+        squares += mismatch.squaredNorm();
+        moment += mismatch * (edge / length).transpose();
       }
-      sum += squared / length;
-    }
-    return sum;
-  };
-  Values<Scalar> result = averaged.topRows(blend.num_blended);
-  parallel_for(blend.num_blended, 1024, [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t r = begin; r < end; ++r) {
-      const double smooth = roughness(averaged, static_cast<Index>(r)),
-                   fitted = roughness(sharp, static_cast<Index>(r));
-      result.row(r) += static_cast<Scalar>(sharp_weight(fitted, smooth)) * (sharp.row(r) - averaged.row(r));
+      const EdgeMetric metric = edge_metric(blend, r, gdim);
+      // What a change of the gradient adds to the squares.
+      const auto added = [&](const Eigen::MatrixXd& change) {
+        return (change * metric.sum - 2 * moment).cwiseProduct(change).sum();
+      };
+      const Eigen::MatrixXd prediction = moment * metric.damped_inverse;
+      const double common = 2 * squares + added(prediction);
+      const double weight =
+          fitted_weight(std::max(0.0, common + added(fit - probe) / 2), std::max(0.0, common + added(average - probe)));
+      fit += blend.prediction_share * (probe + prediction - fit);
+      Eigen::Map<Values<Scalar>>(result.data() + r * columns * gdim, columns, gdim) =
+          (average + weight * (fit - average)).template cast<Scalar>();
     }
   });
   return result;
 }
 
-}  // namespace
-
-template <class Scalar>
-Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Values<Scalar>& values) {
-  const int gdim = reconstruction.stencils.gdim;
-  if (gdim == 3 && values.cols() == 3) return FixedBlend<Scalar, 3, 3>(reconstruction, values).evaluate();
-  if (gdim == 2 && values.cols() == 2) return FixedBlend<Scalar, 2, 2>(reconstruction, values).evaluate();
-  if (gdim == 2 && values.cols() == 3) return FixedBlend<Scalar, 2, 3>(reconstruction, values).evaluate();
-  return blend_any(reconstruction, values);
-}
-
 Reconstruction select_rows(const Reconstruction& reconstruction, std::span<const Index> vertices) {
   const GradientStencilTable& from = reconstruction.stencils;
   if (reconstruction.blend) {
-    if (reconstruction.blend->num_blended != static_cast<Index>(vertices.size()) ||
-        !std::equal(vertices.begin(), vertices.end(), from.vertices.begin()))
+    if (!std::equal(vertices.begin(), vertices.end(), from.vertices.begin(), from.vertices.end()))
       raise("a blended reconstruction must be made for exactly the active vertices, in binding order");
     return reconstruction;
   }

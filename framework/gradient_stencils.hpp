@@ -45,15 +45,31 @@ struct GradientStencilTable {
   bool has_hessians() const { return !hessian_weights.empty(); }
 };
 
-/// A second table and the rule that blends it in, a vertex and a frame at a time (reconstructor `adaptive`).
-/// Roughness of a gradient field at v: ρ(F)_v = Σ over edges e = X_j − X_v of |(F_v + F_j) e − 2 (x_j − x_v)|² / |e|².
+/// What blends the main table's gradients with those of an average, a vertex and a frame at a time (reconstructor
+/// `adaptive`; the rule is that of blended_gradients()).
 struct AdaptiveBlend {
-  GradientStencilTable averaging;       ///< same rows in the same order as the main table
-  Index num_blended = 0;                ///< the first rows need a blended result; the rest serve the roughness only
-  std::vector<Offset> edge_offsets{0};  ///< #num_blended + 1
-  std::vector<Index> edge_rows;         ///< row of the edge's other vertex
-  std::vector<double> edges;            ///< gdim an edge: X_j − X_v
+  GradientStencilTable averaging;       ///< the rows of the main table, in its order
+  GradientStencilTable probing;         ///< the same rows, then those of their neighbours: what edges are tested with
+  double prediction_share = 0;          ///< 0 … 1, of the neighbours' prediction in the fitted gradient
+  std::vector<Offset> edge_offsets{0};  ///< #rows of the main table + 1
+  std::vector<Index> edge_rows;         ///< row of `probing` of the edge's other vertex
+  std::vector<double> edges;            ///< gdim an edge: X_j − X_v, never zero
 };
+
+/// The edges of one vertex as a metric of gradients: Σ êêᵀ, ê = e / |e|, and the inverse of that sum plus a tenth of
+/// its mean eigenvalue, which stays bounded where the edges hardly span the space. Zero where the vertex has no edges.
+struct EdgeMetric {
+  SmallMatrix sum, damped_inverse;  ///< gdim × gdim
+};
+EdgeMetric edge_metric(const AdaptiveBlend& blend, Index row, int gdim);
+
+/// The weight of the fitted gradient by the mismatches of the fitted and of the averaged one: 1 / (1 + 2 q⁶) of their
+/// ratio. Two gradients without mismatch agree: either serves.
+template <class Scalar>
+Scalar fitted_weight(Scalar fitted, Scalar averaged) {
+  const Scalar ratio = fitted > 0 ? fitted / averaged : 0, cubed = ratio * ratio * ratio;
+  return 1 / (1 + 2 * cubed * cubed);
+}
 
 /// What a reconstructor gives: one linear table, or two with a data-dependent blend.
 struct Reconstruction {
@@ -70,13 +86,16 @@ Values<Scalar> apply_stencils(const GradientStencilTable& table, const Values<Sc
 template <class Scalar>
 Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const Values<Scalar>& values);
 
-/// Gradients under a blend (reconstructor `adaptive`) for the first num_blended rows, #num_blended × (#columns · gdim):
-/// F = F_c + w (F_k − F_c), w = 1 / (1 + 2 (ρ(F_k) / ρ(F_c))⁶), with F_c the averaging and F_k the main table's
-/// gradient.
+/// Gradients under a blend (reconstructor `adaptive`), #rows × (#columns · gdim). With F_c, F_k and L the gradients of
+/// `averaging`, the main table and `probing`, the mismatch of a gradient F at v with its neighbours is
+///   E(F) = Σ over edges e of |2 (x_j − x_v) − (F + L_j) e|² / |e|²,
+/// P = L_v + Σ m êᵀ · damped_inverse (m the mismatches of L_v) is the neighbours' prediction, and
+///   F = F_c + w (F_s − F_c),  F_s = F_k + share (P − F_k),
+///   w = fitted_weight((E(L) + E(F_k)) / 2 + E(P), E(F_c) + E(P)).
 template <class Scalar>
 Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Values<Scalar>& values);
 
-/// The rows of `vertices`, in that order. A reconstruction with a blend must already start with them. Throws Error
+/// The rows of `vertices`, in that order. A reconstruction with a blend must already have exactly these. Throws Error
 /// where a vertex has no row.
 Reconstruction select_rows(const Reconstruction& reconstruction, std::span<const Index> vertices);
 

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "framework/interpolant_binding.hpp"
+#include "framework/kernels/blend_stage.hpp"
 #include "framework/kernels/formulas.hpp"
 
 namespace halfgrad {
@@ -60,7 +61,7 @@ void pack_positions(const Values<Scalar>& values, std::span<const Index> vertice
   parallel_for(count, vertex_grain(count), [&](std::int64_t begin, std::int64_t end) {
     for (std::int64_t v = begin; v < end; ++v) {
       const Scalar* from = values.data() + static_cast<Offset>(vertices[v]) * columns;
-      for (int c = 0; c < 4; ++c) positions[4 * v + c] = c < columns ? from[c] : Scalar(0);
+      std::fill(std::copy_n(from, columns, positions + 4 * v), positions + 4 * (v + 1), Scalar(0));
     }
   });
 }
@@ -87,8 +88,9 @@ void pack_lines(const Scalar* positions, const Values<Scalar>& gradients, const 
 template <class Stencils, class Scalar>
 kernels::VertexStage<Scalar> vertex_stage(const Stencils& stencils, int num_weights, const std::array<Scalar, 9>& scale,
                                           const Scalar* positions, Scalar* lines) {
-  return {num_weights, stencils.offsets.data(), stencils.neighbors.data(), stencils.weights.data(), scale, positions,
-          lines};
+  return {
+      num_weights, stencils.first_group.data(), stencils.neighbors.data(), stencils.weights.data(), scale, positions,
+      lines};
 }
 
 // `out` is that of the first point of all blocks.
@@ -100,9 +102,8 @@ kernels::PointStage<Scalar> point_stage(const Runs& runs, Eigen::Index columns, 
           .nodes = runs.nodes.data()->data(),
           .rest = runs.rest.data()->data()->data(),
           .first = runs.first.data(),
-          .first_chunk = runs.first_chunk.data(),
-          .chunks = runs.chunks.data(),
           .local = runs.local.data(),
+          .edges = runs.edges.view(),
           .extrapolates = runs.extrapolates.empty() ? nullptr : runs.extrapolates.data(),
           .affine = runs.affine.data(),
           .lines = lines,
@@ -180,19 +181,17 @@ template <class Scalar>
 void Interpolant<Scalar>::Binding::plain_vertex_stage(const Values<Scalar>& values, int first_weight, int width,
                                                       Values<Scalar>& out) const {
   const Eigen::Index columns = values.cols();
-  const int stride = num_stencil_weights();
   out.resize(num_active, columns * width);
   parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
     for (std::int64_t r = begin; r < end; ++r) {
       Scalar* row = out.data() + r * columns * width;
       std::fill(row, row + columns * width, Scalar(0));
       const Scalar* own = values.data() + static_cast<Offset>(vertices[r]) * columns;
-      for (Offset e = stencils.offsets[r]; e < stencils.offsets[r + 1]; ++e) {
+      for (Offset e = stencils.begin(r); e < stencils.end(r); ++e) {
         const Scalar* other = values.data() + static_cast<Offset>(vertices[stencils.neighbors[e]]) * columns;
-        const Scalar* weight = stencils.weights.data() + e * stride + first_weight;
         for (Eigen::Index c = 0; c < columns; ++c) {
           const Scalar difference = other[c] - own[c];
-          for (int k = 0; k < width; ++k) row[c * width + k] += difference * weight[k];
+          for (int k = 0; k < width; ++k) row[c * width + k] += difference * stencils.weight(e, first_weight + k);
         }
       }
     }
@@ -201,7 +200,6 @@ void Interpolant<Scalar>::Binding::plain_vertex_stage(const Values<Scalar>& valu
 
 template <class Scalar>
 Values<Scalar> Interpolant<Scalar>::Binding::vertex_hessians(const Values<Scalar>& values) const {
-  if (blended) return apply_hessian_stencils(blended->stencils, values).topRows(num_active);
   Values<Scalar> result;
   plain_vertex_stage(values, gdim, num_symmetric(gdim), result);
   return result;
@@ -230,7 +228,7 @@ void Interpolant<Scalar>::Binding::plain_point_stage(const Runs<E>& runs, Index 
       if (with_hessians) hessian[i] = hessians.data() + node * columns * sym;
     }
     for (Index p = runs.first[run]; p < runs.first[run + 1]; ++p) {
-      const NodeVector<E> weights_of_point = runs.beta(run, p);
+      const NodeVector<E> weights_of_point = runs.beta(p);
       std::array<Scalar, n> b;
       for (int i = 0; i < n; ++i) b[i] = static_cast<Scalar>(weights_of_point[i]);
       const auto coefficients = kernels::point_coefficients<Scalar, Scalar, n, d>(used, b, runs.rest[run]);
@@ -273,8 +271,8 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
         },
         any);
 
-  // Gradients for the plain path, and where no stencils give the lines.
-  if (rule.needs_gradients() && gradients == nullptr && (any_plain || blended)) {
+  // Gradients for the plain path.
+  if (rule.needs_gradients() && gradients == nullptr && any_plain) {
     if (blended)
       workspace.gradients = blended_gradients(*blended, values);
     else
@@ -299,7 +297,9 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
       Scalar* target = reserve<Scalar>(workspace.lines, static_cast<Offset>(num_active) * 4 * (1 + num_weights));
       lines = target;
       const auto scale = line_scale<Scalar>(fast, gdim);
-      if (from_stencils) {
+      if (from_stencils && blended) {
+        blend_lines(positions, scale, workspace, target);
+      } else if (from_stencils) {
         const auto stage = vertex_stage(stencils, num_weights, scale, static_cast<const Scalar*>(positions), target);
         parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
           stage.run(static_cast<Index>(begin), static_cast<Index>(end));
@@ -330,6 +330,36 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
     weighted_point_stage(values, gradients != nullptr ? *gradients : none, hessians != nullptr ? *hessians : none, out);
   std::fill(out + static_cast<Offset>(num_served) * values.cols(),
             out + static_cast<Offset>(report.num_points) * values.cols(), std::numeric_limits<Scalar>::quiet_NaN());
+}
+
+template <class Scalar>
+void Interpolant<Scalar>::Binding::blend_lines(const Scalar* positions, const std::array<Scalar, 9>& scale,
+                                               Workspace<Scalar>& workspace, Scalar* lines) const {
+  std::array<Scalar, 9> one;
+  one.fill(1);
+  const Index num_probing = blend.num_probing();
+  const Offset length = 4 * (1 + gdim);
+  Scalar* const averaging = reserve<Scalar>(workspace.averaging, num_active * length);
+  Scalar* const probing = reserve<Scalar>(workspace.probing, num_probing * length);
+  const auto run = [](Index num_rows, const auto& stage) {
+    parallel_for(num_rows, vertex_grain(num_rows), [&](std::int64_t begin, std::int64_t end) {
+      stage.run(static_cast<Index>(begin), static_cast<Index>(end));
+    });
+  };
+  run(num_active, vertex_stage(stencils, gdim, one, positions, lines));
+  run(num_active, vertex_stage(blend.averaging, gdim, one, positions, averaging));
+  run(num_probing, vertex_stage(blend.probing, gdim, one, positions, probing));
+  const AdaptiveBlend& given = *blended->blend;
+  run(num_active, kernels::BlendStage<Scalar>{.dim = gdim,
+                                              .edge_offsets = given.edge_offsets.data(),
+                                              .edge_rows = given.edge_rows.data(),
+                                              .edges = blend.edges.data(),
+                                              .metrics = blend.metrics.data(),
+                                              .averaging = averaging,
+                                              .probing = probing,
+                                              .prediction_share = static_cast<Scalar>(given.prediction_share),
+                                              .scale = scale,
+                                              .lines = lines});
 }
 
 template <class Scalar>
@@ -381,7 +411,7 @@ Index Interpolant<Scalar>::Binding::update(const Values<Scalar>& values, const E
     parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
       for (std::int64_t r = begin; r < end; ++r) {
         std::uint8_t any = moved[r];
-        for (Offset e = stencils.offsets[r]; e < stencils.offsets[r + 1]; ++e) any |= moved[stencils.neighbors[e]];
+        for (Offset e = stencils.begin(r); e < stencils.end(r); ++e) any |= moved[stencils.neighbors[e]];
         stale[r] = any;
       }
       for_each_chosen_range(
@@ -398,10 +428,16 @@ Index Interpolant<Scalar>::Binding::update(const Values<Scalar>& values, const E
       return std::any_of(runs.nodes[run].begin(), runs.nodes[run].end(),
                          [&](Index node) { return changed[node] != 0; });
     };
-    for_each_chosen_range(begin, end, is_stale, [&](Index first, Index last) {
+    // One range a window, from its first stale run to its last: the work that runs of a window share is done once.
+    for (; begin < end; begin += kernels::window_size) {
+      Index first = begin, last = std::min(begin + kernels::window_size, end), num_stale = 0;
+      while (first < last && !is_stale(first)) ++first;
+      while (first < last && !is_stale(last - 1)) --last;
+      if (first == last) continue;
       stage.template run<E>(first, last);
-      num_evaluated += last - first;
-    });
+      for (Index run = first; run < last; ++run) num_stale += is_stale(run);
+      num_evaluated += num_stale;
+    }
   });
   return num_evaluated;
 }

@@ -170,22 +170,6 @@ bool has_affine_map(const NodeMatrix<E>& nodes, double magnitude) {
   return true;
 }
 
-// The chunks of each run.
-template <class Scalar, class Runs>
-void cut_into_chunks(Runs& runs) {
-  constexpr Index size = kernels::chunk_size<Scalar>;
-  const Index num_runs = runs.num_runs();
-  runs.first_chunk.resize(static_cast<std::size_t>(num_runs) + 1);
-  for (Index r = 0; r < num_runs; ++r)
-    runs.first_chunk[r + 1] = runs.first_chunk[r] + (runs.first[r + 1] - runs.first[r] + size - 1) / size;
-  runs.chunks.assign(static_cast<std::size_t>(runs.first_chunk.back()), static_cast<std::uint8_t>(size));
-  for (Index r = 0; r < num_runs; ++r) {
-    const Index last = runs.first_chunk[r + 1] - 1;
-    const Index count = runs.first[r + 1] - runs.first[r] - (last - runs.first_chunk[r]) * size;
-    runs.chunks[last] = static_cast<std::uint8_t>(count | kernels::last_chunk);
-  }
-}
-
 // Fills the runs of one element type from the cells `members` (places in order.cells); sizes are exact.
 template <class Runs, class Scalar>
 void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& order, std::span<const Index> members,
@@ -200,7 +184,6 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
   const auto num_points = static_cast<std::size_t>(runs.first.back());
   runs.local.assign(num_points * d + kernels::vector_padding, Scalar(0));
-  cut_into_chunks<Scalar>(runs);
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
   if (!outside_row.empty() && !E::affine) runs.offset.assign(num_points, -1);
@@ -229,7 +212,7 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
         for (int k = 0; k < d; ++k) {
           double xi = embedding.local(*points, k);
           if (E::affine && outside) xi += embedding.outside[outside_row[*points]].offset[k];
-          runs.local[runs.local_place(r, p, k)] = static_cast<Scalar>(xi);
+          runs.local[static_cast<Offset>(p) * d + k] = static_cast<Scalar>(xi);
         }
         if (outside) runs.extrapolates[r] = 1;
       }
@@ -252,17 +235,18 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
   std::vector<Index> row_of(number.size(), -1);
   for (Index r = 0; r < table.num_rows(); ++r) row_of[table.vertices[r]] = r;
   const int d = table.gdim, sym = with_hessians ? num_symmetric(d) : 0, width = d + sym;
-  stencils.offsets.resize(static_cast<std::size_t>(num_active) + 1);
+  stencils.width = width;
+  stencils.first_group.resize(static_cast<std::size_t>(num_active) + 1);
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
     if (r < 0) raise("no gradient stencil for vertex {}: reconstruct every active vertex", vertices[v]);
-    stencils.offsets[v + 1] = stencils.offsets[v] + table.offsets[r + 1] - table.offsets[r];
+    stencils.first_group[v + 1] = stencils.first_group[v] + (table.offsets[r + 1] - table.offsets[r] + 3) / 4;
   }
-  stencils.neighbors.resize(static_cast<std::size_t>(stencils.offsets.back()));
-  stencils.weights.resize(stencils.neighbors.size() * static_cast<std::size_t>(width) + kernels::vector_padding);
+  stencils.neighbors.resize(static_cast<std::size_t>(4 * stencils.first_group.back()));
+  stencils.weights.assign(stencils.neighbors.size() * static_cast<std::size_t>(width), Scalar(0));
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
-    Offset to = stencils.offsets[v];
+    Offset to = stencils.begin(v);
     for (Offset e = table.offsets[r]; e < table.offsets[r + 1]; ++e, ++to) {
       Index& neighbor = number[table.neighbors[e]];
       if (neighbor < 0) {
@@ -270,12 +254,13 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
         vertices.push_back(table.neighbors[e]);
       }
       stencils.neighbors[to] = neighbor;
-      for (int k = 0; k < d; ++k) stencils.weights[to * width + k] = static_cast<Scalar>(table.weights[e * d + k]);
+      for (int k = 0; k < d; ++k)
+        stencils.weights[stencils.place(to, k)] = static_cast<Scalar>(table.weights[e * d + k]);
       for (int k = 0; k < sym; ++k)
-        stencils.weights[to * width + d + k] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
+        stencils.weights[stencils.place(to, d + k)] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
     }
+    std::fill(stencils.neighbors.begin() + to, stencils.neighbors.begin() + stencils.end(v), v);
   }
-  vertices.shrink_to_fit();
 }
 
 }  // namespace
@@ -289,11 +274,38 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
   if (rule.needs_hessians() && !table.has_hessians() && table.num_rows() > 0)
     raise("dual_taylor needs vertex Hessians: use the reconstructor {{\"kriging\": {{\"drift\": \"cubic\"}}}}");
   has_gradients = true;
-  if (reconstruction->blend)
+  if (reconstruction->blend) {
     blended = select_rows(*reconstruction, vertices);
-  else
-    pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
-  report.num_stencil_entries = blended ? table.num_entries() : static_cast<Offset>(stencils.neighbors.size());
+    take_blend(number);
+  }
+  pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
+  vertices.shrink_to_fit();
+  report.num_stencil_entries += table.num_entries();
+}
+
+template <class Scalar>
+void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
+  const AdaptiveBlend& given = *blended->blend;
+  // Rows of the probing table are vertices of the same number.
+  for (Index r = num_active; r < given.probing.num_rows(); ++r) {
+    number[given.probing.vertices[r]] = static_cast<Index>(vertices.size());
+    vertices.push_back(given.probing.vertices[r]);
+  }
+  pack_stencils(given.probing, false, given.probing.num_rows(), vertices, number, blend.probing);
+  pack_stencils(given.averaging, false, num_active, vertices, number, blend.averaging);
+  report.num_stencil_entries += given.probing.num_entries() + given.averaging.num_entries();
+  for (Offset e = 0; e < static_cast<Offset>(given.edge_rows.size()); ++e) {
+    const Eigen::Map<const Eigen::VectorXd> edge(given.edges.data() + e * gdim, gdim);
+    const double length = edge.norm();
+    blend.edges.push_back(static_cast<Scalar>(2 / length));
+    for (int a = 0; a < gdim; ++a) blend.edges.push_back(static_cast<Scalar>(edge[a] / length));
+  }
+  for (Index r = 0; r < num_active; ++r) {
+    const EdgeMetric metric = edge_metric(given, r, gdim);
+    for (const SmallMatrix* matrix : {&metric.sum, &metric.damped_inverse})
+      for (int a = 0; a < gdim; ++a)
+        for (int c = a; c < gdim; ++c) blend.metrics.push_back(static_cast<Scalar>((*matrix)(a, c)));
+  }
 }
 
 template <class Scalar>
@@ -302,16 +314,19 @@ void Interpolant<Scalar>::Binding::count_bytes() {
   for (const auto& any : blocks)
     std::visit(
         [&](const auto& runs) {
-          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.first_chunk) +
-                          bytes(runs.chunks) + bytes(runs.affine) + bytes(runs.local) + bytes(runs.offset) +
-                          bytes(runs.offsets) + bytes(runs.extrapolates);
+          report.bytes += bytes(runs.nodes) + bytes(runs.rest) + bytes(runs.first) + bytes(runs.affine) +
+                          bytes(runs.local) + bytes(runs.offset) + bytes(runs.offsets) + bytes(runs.extrapolates) +
+                          bytes(runs.edges.first) + bytes(runs.edges.ends) + bytes(runs.edges.vectors) +
+                          bytes(runs.edges.of_run) + bytes(runs.edges.reversed);
         },
         any);
   report.bytes += bytes(weighted.first) + bytes(weighted.nodes) + bytes(weighted.coefficients) + bytes(weighted.beta);
-  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position) + bytes(stencils.offsets) +
-                  bytes(stencils.neighbors) + bytes(stencils.weights);
+  report.bytes += bytes(vertices) + bytes(permutation) + bytes(position);
+  for (const Stencils* rows : {&stencils, &blend.averaging, &blend.probing})
+    report.bytes += bytes(rows->first_group) + bytes(rows->neighbors) + bytes(rows->weights);
+  report.bytes += bytes(blend.edges) + bytes(blend.metrics);
   if (blended)
-    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging})
+    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging, &blended->blend->probing})
       report.bytes += bytes(table->offsets) + bytes(table->neighbors) + bytes(table->weights);
 }
 
@@ -370,6 +385,9 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
     runs.base = base;
     pack_runs<Runs, Scalar>(mesh, embedding, order, members, numbers.empty() ? number : part_number, outside_row, runs,
                             binding->permutation.data() + base);
+    if constexpr (E::affine)
+      if (rule.needs_gradients() && !rule.needs_hessians())
+        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, runs.rest);
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));
   });

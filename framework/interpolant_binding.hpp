@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "framework/edge_windows.hpp"
 #include "framework/error.hpp"
 #include "framework/interpolant.hpp"
 #include "framework/parallel.hpp"
@@ -21,9 +22,8 @@ struct Interpolant<Scalar>::Binding {
   //   nodes        [run][node]          number of the vertex
   //   rest         [run][node][axis]    rest position relative to the run's first node; one run more than there is
   //   first        [run]                position of the run's first point in the block
-  //   chunks       [chunk]              number of points, and last_chunk at a run's end (kernels/cell_polynomial.hpp)
-  //   first_chunk  [run]
-  //   local        [chunk][axis][point] ξ; for simplices of a point outside too
+  //   local        [point][axis]        ξ; for simplices of a point outside too
+  //   edges        of simplices whose rule takes gradients but no Hessians (kernels/cell_polynomial.hpp)
   //   affine       [run]                1 where x(ξ) is affine (polynomial elements but simplices)
   //   offset       [point]              row of `offsets` for points outside, else −1 (empty where no point is outside)
   //   extrapolates [run]                1 where a point is outside (empty where none is)
@@ -33,30 +33,24 @@ struct Interpolant<Scalar>::Binding {
     Index base = 0;  // sorted position of the block's first point
     std::vector<std::array<Index, E::num_nodes>> nodes;
     std::vector<std::array<std::array<Scalar, E::dim>, E::num_nodes>> rest;
-    std::vector<Index> first, first_chunk;
-    std::vector<std::uint8_t> chunks, affine;
+    std::vector<Index> first;
+    std::vector<std::uint8_t> affine;
     std::vector<Scalar> local;
+    EdgeWindows<Scalar> edges;
     std::vector<Index> offset;
     std::vector<std::array<Scalar, E::dim>> offsets;
     std::vector<std::uint8_t> extrapolates;
 
     Index num_runs() const { return static_cast<Index>(nodes.size()); }
     Index num_points() const { return first.back(); }
-    // Place of ξ_k of the run's point p in `local`.
-    std::size_t local_place(Index run, Index p, int k) const {
-      constexpr Index size = kernels::chunk_size<Scalar>;
-      const Index in_chunk = (p - first[run]) % size, chunk = p - in_chunk;
-      const Offset count = std::min(size, first[run + 1] - chunk);
-      return static_cast<std::size_t>(static_cast<Offset>(chunk) * E::dim + k * count + in_chunk);
-    }
-    ReferencePoint<E> xi(Index run, Index p) const {
+    ReferencePoint<E> xi(Index p) const {
       ReferencePoint<E> result;
-      for (int k = 0; k < E::dim; ++k) result[k] = static_cast<double>(local[local_place(run, p, k)]);
+      for (int k = 0; k < E::dim; ++k) result[k] = static_cast<double>(local[static_cast<Offset>(p) * E::dim + k]);
       return result;
     }
     // Weights of one point.
-    NodeVector<E> beta(Index run, Index p) const {
-      const ReferencePoint<E> at = xi(run, p);
+    NodeVector<E> beta(Index p) const {
+      const ReferencePoint<E> at = xi(p);
       NodeVector<E> result = E::shape(at);
       if (!offset.empty() && offset[p] >= 0) {
         const NodeMatrix<E> gradient = E::shape_gradient(at);
@@ -67,11 +61,27 @@ struct Interpolant<Scalar>::Binding {
   };
   using AnyRuns = Elements::apply<std::variant, Runs>;
 
-  // Rows of the active vertices in the numbering of `vertices`: weights of gradients, then of Hessians, an entry.
+  // Rows of the active vertices in the numbering of `vertices`, in groups of four entries
+  // (kernels/cell_polynomial.hpp). What fills a row up to whole groups is the vertex itself with weights of zero.
   struct Stencils {
-    std::vector<Offset> offsets{0};
+    int width = 0;  // weights of an entry: of the gradient, then of the Hessian
+    std::vector<Offset> first_group{0};
     std::vector<Index> neighbors;
     std::vector<Scalar> weights;
+
+    Offset begin(Offset row) const { return 4 * first_group[row]; }
+    Offset end(Offset row) const { return 4 * first_group[row + 1]; }
+    Offset place(Offset entry, int k) const { return 4 * (entry / 4 * width + k) + entry % 4; }
+    Scalar weight(Offset entry, int k) const { return weights[place(entry, k)]; }
+  };
+
+  // A blend for the fast path; its main table is `stencils`. Rows of `probing` are the active vertices and those
+  // that follow them in the numbering.
+  struct Blend {
+    Stencils averaging, probing;
+    std::vector<Scalar> edges, metrics;  // kernels/blend_stage.hpp
+
+    Index num_probing() const { return static_cast<Index>(probing.first_group.size() - 1); }
   };
 
   // Points given by their weights: what a point reads of each vertex, a | c_1 … c_d | (q_11 …), and β apart.
@@ -95,7 +105,8 @@ struct Interpolant<Scalar>::Binding {
   std::vector<Index> position;     // its inverse; empty where the orders are the same
   bool has_gradients = false;
   Stencils stencils;
-  std::optional<Reconstruction> blended;  // instead of stencils
+  std::optional<Reconstruction> blended;  // of the plain path, where `stencils` are part of a blend
+  Blend blend;
 
   void require_values(const Values<Scalar>& values) const {
     if (values.rows() != report.num_vertices)
@@ -106,21 +117,20 @@ struct Interpolant<Scalar>::Binding {
       raise("this interpolant was bound without a reconstructor: give vertex gradients to evaluate_given");
   }
 
-  int num_stencil_weights() const { return gdim + (rule.needs_hessians() ? num_symmetric(gdim) : 0); }
-
-  // Calls body(runs, begin, end) on ranges of runs that hold some thousand points each.
+  // Calls body(runs, begin, end) on ranges of runs that hold some thousand points each. Ranges begin with a window.
   template <class Body>
   void for_each_range(Body&& body) const {
     for (const AnyRuns& any : blocks)
       std::visit(
           [&](const auto& runs) {
-            const Offset num_runs = runs.num_runs();
-            const Offset num_points = runs.num_points();
+            constexpr Offset size = kernels::window_size;
+            const Offset num_runs = runs.num_runs(), num_points = runs.num_points();
+            const Offset num_windows = (num_runs + size - 1) / size;
             const Offset grain = num_points < parallel_threshold
-                                     ? num_runs
-                                     : std::max<Offset>(1, num_runs * points_per_task / num_points);
-            parallel_for(num_runs, grain, [&](std::int64_t begin, std::int64_t end) {
-              body(runs, static_cast<Index>(begin), static_cast<Index>(end));
+                                     ? num_windows
+                                     : std::max<Offset>(1, num_windows * points_per_task / num_points);
+            parallel_for(num_windows, grain, [&](std::int64_t begin, std::int64_t end) {
+              body(runs, static_cast<Index>(begin * size), static_cast<Index>(std::min(end * size, num_runs)));
             });
           },
           any);
@@ -177,12 +187,16 @@ struct Interpolant<Scalar>::Binding {
   // The end of bind: the rows of the active vertices, and sums for the report. `number` is the binding's number of each
   // of the caller's vertices, −1 where it has none yet.
   void take_gradients(const Reconstruction* reconstruction, std::vector<Index>& number);
+  void take_blend(std::vector<Index>& number);
   void count_bytes();
 
   // Both stages into `out`, #points × #columns in sorted order. Gradients come from the stencils where null.
   void frame(const Values<Scalar>& values, const Values<Scalar>* gradients, const Values<Scalar>* hessians,
              const EvaluateOptions& options, Workspace<Scalar>& workspace, Scalar* out) const;
   void to_caller_order(const Values<Scalar>& sorted, Values<Scalar>& out) const;
+  // Lines of the active vertices under the blend; scale as in kernels::VertexStage.
+  void blend_lines(const Scalar* positions, const std::array<Scalar, 9>& scale, Workspace<Scalar>& workspace,
+                   Scalar* lines) const;
   // Whether every cell goes the fast path alone.
   bool all_fast(Eigen::Index columns, Kernel kernel) const;
   // The cells that changed since the workspace's last frame; their number.

@@ -24,11 +24,11 @@ Values<Scalar> Interpolant<Scalar>::gradient(const Values<Scalar>& values) const
     constexpr int n = E::num_nodes, d = E::dim, sym = num_symmetric(d);
     for (Index run = begin; run < end; ++run)
       for (Index p = runs.first[run]; p < runs.first[run + 1]; ++p) {
-        const NodeMatrix<E> reference = E::shape_gradient(runs.xi(run, p));
+        const NodeMatrix<E> reference = E::shape_gradient(runs.xi(p));
         Eigen::Matrix<double, d, d> jacobian = Eigen::Matrix<double, d, d>::Zero();
         for (int i = 0; i < n; ++i)
           for (int k = 0; k < d; ++k) jacobian.row(k) += static_cast<double>(runs.rest[run][i][k]) * reference.row(i);
-        const NodeVector<E> weights = runs.beta(run, p);
+        const NodeVector<E> weights = runs.beta(p);
         Scalar* result = out.data() + static_cast<Offset>(binding.permutation[runs.base + p]) * columns * d;
         // Where the map of the cell folds to a point or a line (a hexahedron's collapsed corner) no gradient of the
         // weights exists; the continuous one does.
@@ -87,7 +87,7 @@ Values<Scalar> Interpolant<Scalar>::smooth_gradient(const Values<Scalar>& values
     using E = typename AnyElementRuns::element;
     for (Index run = begin; run < end; ++run)
       for (Index p = runs.first[run]; p < runs.first[run + 1]; ++p) {
-        const NodeVector<E> weights = runs.beta(run, p);
+        const NodeVector<E> weights = runs.beta(p);
         auto row = out.row(binding.permutation[runs.base + p]);
         row.setZero();
         for (int i = 0; i < E::num_nodes; ++i)
@@ -101,15 +101,14 @@ Values<Scalar> Interpolant<Scalar>::smooth_gradient(const Values<Scalar>& values
 template <class Scalar>
 void Interpolant<Scalar>::Binding::add_entries(Index point, Index node, double a, const double* c, const double* q,
                                                Entries& entries) const {
-  const int width = num_stencil_weights();
   double own = a;
   if (rule.needs_gradients())
-    for (Offset e = stencils.offsets[node]; e < stencils.offsets[node + 1]; ++e) {
+    for (Offset e = stencils.begin(node); e < stencils.end(node); ++e) {
       double weight = 0;
-      for (int k = 0; k < gdim; ++k) weight += c[k] * static_cast<double>(stencils.weights[e * width + k]);
+      for (int k = 0; k < gdim; ++k) weight += c[k] * static_cast<double>(stencils.weight(e, k));
       if (rule.needs_hessians())
         for (int k = 0; k < num_symmetric(gdim); ++k)
-          weight += q[k] * static_cast<double>(stencils.weights[e * width + gdim + k]);
+          weight += q[k] * static_cast<double>(stencils.weight(e, gdim + k));
       entries.emplace_back(point, vertices[stencils.neighbors[e]], weight);
       own -= weight;
     }
@@ -129,7 +128,7 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> Interpolant<Scalar>::matrix() const
           constexpr int n = E::num_nodes, d = E::dim;
           for (Index run = 0; run < runs.num_runs(); ++run)
             for (Index p = runs.first[run]; p < runs.first[run + 1]; ++p) {
-              const NodeVector<E> weights = runs.beta(run, p);
+              const NodeVector<E> weights = runs.beta(p);
               std::array<double, n> beta;
               std::array<std::array<double, d>, n> rest;
               for (int i = 0; i < n; ++i) {

@@ -119,6 +119,10 @@ class InverseMap {
     Point from_first = inverse_ * target;
     // One step of refinement gives flat cells the residual that the inverse alone would not.
     from_first += inverse_ * (target - jacobian * from_first);
+    // Where the inverse is worth nothing, on needles that are oblique to the axes, elimination with pivots is exact to
+    // the rounding of the position.
+    if (!((target - jacobian * from_first).cwiseAbs().maxCoeff() <= 1e-14 * std::max(1.0, target.norm())))
+      from_first = jacobian.fullPivLu().solve(target);
     result.xi = first + from_first;
     result.converged = true;
     return result;

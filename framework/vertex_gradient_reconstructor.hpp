@@ -16,7 +16,7 @@ class Grid;
 class VertexGradientReconstructor {
  public:
   virtual ~VertexGradientReconstructor() = default;
-  /// Rows for `vertices` (distinct, any order), in that order; a reconstruction with a blend may append further rows.
+  /// Rows for `vertices` (distinct, any order), in that order.
   virtual Reconstruction reconstruct(const CellGradients& cells, std::span<const Index> vertices) const = 0;
   /// The same on a grid. Unless overridden it lists the grid's cells as an explicit mesh meanwhile.
   virtual Reconstruction reconstruct_on_grid(const Grid& grid, std::span<const Index> vertices) const;

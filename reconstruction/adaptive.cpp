@@ -29,7 +29,7 @@ Reconstruction Adaptive::reconstruct(const CellGradients& cells, std::span<const
   for (std::size_t r = 0; r < vertices.size(); ++r) row_of[vertices[r]] = static_cast<Index>(r);
 
   AdaptiveBlend blend;
-  blend.num_blended = static_cast<Index>(vertices.size());
+  blend.prediction_share = 0.25;
   for (Index vertex : vertices) {
     find_neighbors(cells, vertex, neighbors);
     for (Index v : neighbors) {
@@ -44,8 +44,9 @@ Reconstruction Adaptive::reconstruct(const CellGradients& cells, std::span<const
     }
     blend.edge_offsets.push_back(static_cast<Offset>(blend.edge_rows.size()));
   }
-  Reconstruction result = Kriging().reconstruct(cells, rows);
-  blend.averaging = ChandrashekarGarg().reconstruct(cells, rows).stencils;
+  blend.probing = Kriging({.patch = KrigingPatch::lean}).reconstruct(cells, rows).stencils;
+  blend.averaging = ChandrashekarGarg().reconstruct(cells, vertices).stencils;
+  Reconstruction result = Kriging().reconstruct(cells, vertices);
   result.blend = std::move(blend);
   return result;
 }

@@ -5,10 +5,10 @@
 
 namespace halfgrad {
 
-/// Chandrashekar–Garg and wide kriging gradients, blended a vertex and a frame at a time by how rough each leaves the
-/// edges at the vertex: kriging where the mesh resolves the field, averaging where it does not (docs/adaptive.md). The
-/// blend takes place in blended_gradients(); `stencils` are the kriging rows of the vertices asked for and, appended,
-/// of their neighbours.
+/// Chandrashekar–Garg gradients, and wide kriging gradients with a share of what the neighbours predict, blended a
+/// vertex and a frame at a time by how well each goes with lean kriging gradients of the neighbours along the edges:
+/// kriging where the mesh resolves the field, averaging where it does not (docs/adaptive.md). The blend takes place in
+/// blended_gradients().
 class Adaptive final : public VertexGradientReconstructor {
  public:
   Reconstruction reconstruct(const CellGradients& cells, std::span<const Index> vertices) const override;

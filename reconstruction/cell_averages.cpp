@@ -19,6 +19,17 @@ void add_adjacent(const CellGradients& cells, Index vertex, CellStar& star) {
   for (const Index cell : cells.cells_of(vertex)) star.add(vertex, cell);
 }
 
+bool on_vertex(const Vector& offset) { return !(offset.squaredNorm() > 0); }
+
+// Weights by inverse distance. Far from the origin rounding may put a centroid onto the vertex: in the limit the
+// weights of all other cells are then zero.
+void weigh_by_distance(CellStar& star) {
+  const bool any_on_vertex = std::any_of(star.offsets.begin(), star.offsets.end(), on_vertex);
+  star.weights.clear();
+  for (const Vector& offset : star.offsets)
+    star.weights.push_back(!any_on_vertex ? 1 / offset.norm() : on_vertex(offset) ? 1.0 : 0.0);
+}
+
 // James 2020, Eq. 24–27 over the cells of a star in D dimensions.
 template <int D>
 void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
@@ -52,12 +63,13 @@ void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
   if (std::abs(total) > 1e-10 * magnitude) return;
   if (epsilon == 0)
     raise("chandrashekar_garg: the weights of vertex {} sum to zero with epsilon 0: use epsilon > 0", vertex);
-  for (std::size_t k = 0; k < star.cells.size(); ++k) star.weights[k] = 1 / star.offsets[k].norm();
+  weigh_by_distance(star);
 }
 
 void weigh_consistently(int gdim, double epsilon, Index vertex, CellStar& star) {
   static_assert(max_gdim == 4);
   if (star.cells.empty()) return;
+  if (std::any_of(star.offsets.begin(), star.offsets.end(), on_vertex)) return weigh_by_distance(star);
   if (gdim == 1) return weigh_consistently<1>(epsilon, vertex, star);
   if (gdim == 2) return weigh_consistently<2>(epsilon, vertex, star);
   if (gdim == 3) return weigh_consistently<3>(epsilon, vertex, star);
@@ -132,7 +144,7 @@ void UnweightedAverage::weigh(const CellGradients& cells, Index vertex, CellStar
 
 void InverseDistance::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
   add_adjacent(cells, vertex, star);
-  for (const Vector& offset : star.offsets) star.weights.push_back(1 / offset.norm());
+  weigh_by_distance(star);
 }
 
 void VolumeAverage::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {

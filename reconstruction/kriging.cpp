@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 
 #include "framework/error.hpp"
-#include "reconstruction/cell_averages.hpp"
 #include "reconstruction/kriging_system.hpp"
 #include "reconstruction/row_assembly.hpp"
 #include "reconstruction/symmetric_eigen.hpp"
@@ -85,7 +85,7 @@ class KrigingRow {
     row.diagnostics.schedule_entry = static_cast<std::uint8_t>(best_entry_);
     row.diagnostics.smallest_singular_value = static_cast<float>(best_.smallest_singular_value);
     row.diagnostics.expected_error = static_cast<float>(best_.expected_error);
-    if (best_.quadratic_response > missing_modes && fall_back(vertex, row)) return;
+    if (best_.quadratic_response > missing_modes) return fall_back(vertex, row);
     write(row);
     row.diagnostics.rule =
         !accepted ? StencilRule::damped : (best_entry_ == first ? StencilRule::full_fit : StencilRule::wider_patch);
@@ -152,18 +152,26 @@ class KrigingRow {
       points_.col(static_cast<Eigen::Index>(j)) = metric_ * (cells_->vertices().row(patch_[j]) - origin).transpose();
   }
 
-  // The volume-weighted mean of the adjacent cells' gradients. False where no cell is usable.
-  bool fall_back(Index vertex, StencilRow& row) const {
-    const CellWeights average = VolumeAverage().weights(*cells_, vertex);
-    if (average.cells.empty()) return false;
-    compose_row(*cells_, vertex, average.cells, average.weights, row);
+  // The volume-weighted mean of the gradients of the cells within two rings. Where modes are missing these are as a
+  // rule all cells of a part of the mesh: its vertices then agree, and no curvature is made up that no value tells.
+  // No row where no cell is usable: what a flat patch makes of the direction across it is rounding.
+  void fall_back(Index vertex, StencilRow& row) {
+    std::vector<Index> cells(cells_->cells_of(vertex).begin(), cells_->cells_of(vertex).end());
+    for (Index v : rings_.within(2)) cells.insert(cells.end(), cells_->cells_of(v).begin(), cells_->cells_of(v).end());
+    std::sort(cells.begin(), cells.end());
+    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+    std::vector<double> weights;
+    for (Index cell : cells) weights.push_back(cells_->gradient(cell).volume);
+    const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+    if (!(sum > 0)) return;
+    for (double& weight : weights) weight /= sum;
+    compose_row(*cells_, vertex, cells, weights, row);
     const Eigen::Index gdim = cells_->gdim(), count = static_cast<Eigen::Index>(row.neighbors.size());
-    const Eigen::Map<const Eigen::MatrixXd> weights(row.weights.data(), gdim, count);
-    row.diagnostics.absolute_sum = static_cast<float>(weights.colwise().norm().sum() * scale_);
+    const Eigen::Map<const Eigen::MatrixXd> stencil(row.weights.data(), gdim, count);
+    row.diagnostics.absolute_sum = static_cast<float>(stencil.colwise().norm().sum() * scale_);
     row.diagnostics.rule = StencilRule::cell_value;
     row.diagnostics.num_points = static_cast<Index>(count);
     row.hessian_weights.assign(best_.hessian.rows() * count, 0.0);
-    return true;
   }
 
   // Back from the metric: ∂/∂X = T ∂/∂y.

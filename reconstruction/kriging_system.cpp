@@ -21,7 +21,7 @@ constexpr double correlation_length = 6;
 constexpr double quadratic_nugget = 1e-5, cubic_nugget = 1e-6;
 // Modes with smaller singular values are damped.
 constexpr double full_inverse = 2;
-constexpr int max_modes = 10;  // of the cubic stage in 3D
+constexpr int max_modes = 20;  // of the cubic stage in four dimensions
 using SmallSquare = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_modes, max_modes>;
 
 constexpr int num_cubic(int dim) { return dim * (dim + 1) * (dim + 2) / 6; }
@@ -77,7 +77,7 @@ struct Stage {
 
 // A ← A V with orthogonal columns, by rotations of pairs (one-sided Jacobi: Hestenes 1958); V is accumulated. The norms
 // of the columns are then the singular values, to high relative accuracy, and no zero column is divided by.
-void orthogonalize_columns(Block& a, SmallSquare& v) {
+void orthogonalize_columns(SmallSquare& a, SmallSquare& v) {
   const Eigen::Index size = a.cols();
   v.setIdentity(size, size);
   const double negligible = 1e-24 * a.squaredNorm();
@@ -105,31 +105,53 @@ void orthogonalize_columns(Block& a, SmallSquare& v) {
   }
 }
 
+// Takes the part along the first `count` columns of `basis`, which are orthonormal or zero, out of a column; twice is
+// enough for orthogonality to round-off. Adds the coefficients to the first entries of `coefficients`.
+template <class Column, class Coefficients>
+void project_out(const Block& basis, Eigen::Index count, Column&& column, Coefficients&& coefficients) {
+  for (int pass = 0; pass < 2; ++pass)
+    for (Eigen::Index k = 0; k < count; ++k) {
+      const double along = basis.col(k).dot(column);
+      column -= along * basis.col(k);
+      coefficients[k] += along;
+    }
+}
+
 // Projects the stage's columns on the complement of the basis, inverts what is left and extends the basis by the modes
 // that are determined. Returns the smallest singular value.
 double fit_stage(Stage& stage, bool damp, Block& basis, Eigen::Index& num_basis, Block& projected) {
   const Eigen::Index size = stage.columns.cols(), num_before = num_basis;
   projected = stage.columns;
-  for (int pass = 0; pass < 2; ++pass)  // twice is enough for orthogonality to round-off
-    for (Eigen::Index k = 0; k < num_before; ++k)
-      for (Eigen::Index c = 0; c < size; ++c) projected.col(c) -= basis.col(k).dot(projected.col(c)) * basis.col(k);
-  SmallSquare v;
-  orthogonalize_columns(projected, v);
-  double largest = 0, smallest = std::numeric_limits<double>::infinity();
-  for (Eigen::Index m = 0; m < size; ++m) {
-    largest = std::max(largest, projected.col(m).norm());
-    smallest = std::min(smallest, projected.col(m).norm());
+  // projected = Q R with a small R, whose singular values are wanted.
+  SmallSquare r = SmallSquare::Zero(size, size), v;
+  Eigen::VectorXd ignored = Eigen::VectorXd::Zero(num_before);
+  for (Eigen::Index c = 0; c < size; ++c) {
+    auto column = projected.col(c);
+    const double before = column.norm();
+    project_out(basis, num_before, column, ignored);
+    project_out(projected, c, column, r.col(c));
+    const double norm = column.norm();
+    if (norm > 1e-14 * before) {
+      r(c, c) = norm;
+      column /= norm;
+    } else {
+      column.setZero();
+    }
   }
-  stage.inverse.setZero();
+  orthogonalize_columns(r, v);
+  const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_modes, 1> singular = r.colwise().norm().transpose();
+  const double largest = singular.maxCoeff();
+  SmallSquare filtered = SmallSquare::Zero(size, size);  // V f(S) Uᵀ of R
   for (Eigen::Index m = 0; m < size; ++m) {
-    const double s = projected.col(m).norm();
+    const double s = singular[m];
     if (!(s > 1e-10 * largest)) continue;
-    projected.col(m) /= s;
-    const double filtered = damp && s < full_inverse ? s / (full_inverse * full_inverse) : 1 / s;
-    for (Eigen::Index c = 0; c < size; ++c) stage.inverse.row(c) += filtered * v(c, m) * projected.col(m).transpose();
-    if (!damp || s >= full_inverse) basis.col(num_basis++) = projected.col(m);
+    r.col(m) /= s;
+    filtered +=
+        (damp && s < full_inverse ? s / (full_inverse * full_inverse) : 1 / s) * v.col(m) * r.col(m).transpose();
+    if (!damp || s >= full_inverse) basis.col(num_basis++) = projected.lazyProduct(r.col(m));
   }
-  return smallest;
+  stage.inverse = filtered.lazyProduct(projected.transpose());
+  return singular.minCoeff();
 }
 
 }  // namespace
@@ -140,7 +162,7 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   const Eigen::Index n = points.cols(), dim = dim_, num_quadratic = num_symmetric(dim_);
   const Eigen::Index num_drift = dim + num_quadratic + (degree_ == 3 ? num_cubic(dim_) : 0);
   const Eigen::Index num_functionals = dim + (degree_ == 3 ? num_quadratic : 0);
-  memory_.resize(std::max<std::size_t>(memory_.size(), n * (n + 2 + 6 * num_drift + 3 * num_functionals)));
+  memory_.resize(std::max<std::size_t>(memory_.size(), n * (n + 2 + dim + 6 * num_drift + 3 * num_functionals)));
   Arena arena(memory_);
   const double rate = std::sqrt(7.0) / correlation_length, rate2 = rate * rate;
 
@@ -221,6 +243,17 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   weights = rows_out.leftCols(n);
   cholesky.matrixL().solveInPlace<Eigen::OnTheRight>(weights);
 
+  // Where points lie at very different distances the higher degrees leave their rounding, relative to their squares and
+  // cubes, in the linear constraint: that gradients of linear functions are exact and their Hessians zero. It is met
+  // once more by itself.
+  SmallSquare residual = -weights.lazyProduct(points.transpose());
+  residual.topRows(dim) += SmallSquare::Identity(dim, dim);
+  if (residual.cwiseAbs().maxCoeff() > 1e-13) {
+    Block linear = arena.take(dim, n);
+    linear = stages[0].inverse;
+    cholesky.matrixL().solveInPlace<Eigen::OnTheRight>(linear);
+    weights += residual.lazyProduct(linear);
+  }
   fit.gradient = weights.topRows(dim);
   fit.hessian = weights.bottomRows(num_functionals - dim);
   fit.absolute_sum = fit.gradient.colwise().norm().sum();

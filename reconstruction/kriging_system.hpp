@@ -21,7 +21,7 @@ struct KrigingFit {
 /// Holds the workspace; one a thread.
 class KrigingSystem {
  public:
-  /// dim 1 to 3; degree of the drift 2 or 3.
+  /// dim 1 to 4; degree of the drift 2 or 3.
   KrigingSystem(int dim, int degree);
 
   /// Points, dim × #points with #points ≥ 1, in units of the neighbours' distance. Overwrites `fit`.

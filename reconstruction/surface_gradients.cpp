@@ -143,22 +143,22 @@ Reconstruction surface_gradients(const VertexGradientReconstructor& reconstructo
                                  std::span<const Index> vertices) {
   const Patches patches(surface);
   std::vector<Index> wanted(vertices.begin(), vertices.end());
-  std::vector<StencilRow> rows, averaging;
+  std::vector<StencilRow> rows, averaging, probing;
   // Rows of wanted[first …]; whether any of them is a blend.
   const auto make_rows = [&](std::size_t first) {
-    rows.resize(wanted.size());
-    averaging.resize(wanted.size());
+    for (std::vector<StencilRow>* table : {&rows, &averaging, &probing}) table->resize(wanted.size());
     std::vector<char> has_blend(wanted.size(), 0);
     parallel_for(static_cast<std::int64_t>(wanted.size() - first), 16, [&](std::int64_t begin, std::int64_t end) {
       Patch patch;
       for (std::size_t r = first + static_cast<std::size_t>(begin); r < first + static_cast<std::size_t>(end); ++r) {
-        rows[r].diagnostics.rule = averaging[r].diagnostics.rule = StencilRule::none;
+        rows[r].diagnostics.rule = averaging[r].diagnostics.rule = probing[r].diagnostics.rule = StencilRule::none;
         if (!patches.make(wanted[r], patch)) continue;
         const std::array<Index, 1> center = {0};
         const Reconstruction flat = reconstructor.reconstruct(CellGradients(patch.mesh), center);
         lift_row(surface, patch, flat.stencils, rows[r]);
         if (!flat.blend) continue;
         lift_row(surface, patch, flat.blend->averaging, averaging[r]);
+        lift_row(surface, patch, flat.blend->probing, probing[r]);
         has_blend[r] = 1;
       }
     });
@@ -167,36 +167,36 @@ Reconstruction surface_gradients(const VertexGradientReconstructor& reconstructo
   const bool blended = make_rows(0);
 
   Reconstruction result;
-  if (blended) {
-    // The roughness is measured along the edges to the neighbours, which need rows too.
-    AdaptiveBlend blend;
-    blend.num_blended = static_cast<Index>(wanted.size());
-    std::vector<Index> row_of(static_cast<std::size_t>(surface.num_vertices()), -1), neighbors;
-    for (std::size_t r = 0; r < wanted.size(); ++r) row_of[wanted[r]] = static_cast<Index>(r);
-    for (Index vertex : vertices) {
-      neighbors.clear();
-      for (Index cell : patches.cells_of(vertex))
-        for (Index v : surface.cell_vertices(cell))
-          if (v != vertex) neighbors.push_back(v);
-      std::sort(neighbors.begin(), neighbors.end());
-      neighbors.erase(std::unique(neighbors.begin(), neighbors.end()), neighbors.end());
-      for (Index v : neighbors) {
-        const Eigen::Vector3d edge = (surface.vertices().row(v) - surface.vertices().row(vertex)).transpose();
-        if (!(edge.squaredNorm() > 0)) continue;
-        if (row_of[v] < 0) {
-          row_of[v] = static_cast<Index>(wanted.size());
-          wanted.push_back(v);
-        }
-        blend.edge_rows.push_back(row_of[v]);
-        blend.edges.insert(blend.edges.end(), edge.data(), edge.data() + 3);
-      }
-      blend.edge_offsets.push_back(static_cast<Offset>(blend.edge_rows.size()));
-    }
-    make_rows(vertices.size());
-    blend.averaging = table_of(wanted, averaging);
-    result.blend = std::move(blend);
-  }
   result.stencils = table_of(wanted, rows);
+  if (!blended) return result;
+  // The edges to the neighbours are tested with rows of theirs. The prediction takes no share: it would take an edge's
+  // part along the normal for a mismatch of the gradients, and spoil the rest shape.
+  AdaptiveBlend blend;
+  blend.averaging = table_of(wanted, averaging);
+  std::vector<Index> row_of(static_cast<std::size_t>(surface.num_vertices()), -1), neighbors;
+  for (std::size_t r = 0; r < wanted.size(); ++r) row_of[wanted[r]] = static_cast<Index>(r);
+  for (Index vertex : vertices) {
+    neighbors.clear();
+    for (Index cell : patches.cells_of(vertex))
+      for (Index v : surface.cell_vertices(cell))
+        if (v != vertex) neighbors.push_back(v);
+    std::sort(neighbors.begin(), neighbors.end());
+    neighbors.erase(std::unique(neighbors.begin(), neighbors.end()), neighbors.end());
+    for (Index v : neighbors) {
+      const Eigen::Vector3d edge = (surface.vertices().row(v) - surface.vertices().row(vertex)).transpose();
+      if (!(edge.squaredNorm() > 0)) continue;
+      if (row_of[v] < 0) {
+        row_of[v] = static_cast<Index>(wanted.size());
+        wanted.push_back(v);
+      }
+      blend.edge_rows.push_back(row_of[v]);
+      blend.edges.insert(blend.edges.end(), edge.data(), edge.data() + 3);
+    }
+    blend.edge_offsets.push_back(static_cast<Offset>(blend.edge_rows.size()));
+  }
+  make_rows(vertices.size());
+  blend.probing = table_of(wanted, probing);
+  result.blend = std::move(blend);
   return result;
 }
 

@@ -4,24 +4,32 @@
 //
 // Data, all in units of Scalar unless said; "four" is a vector of four that holds the 1 … 3 columns, padded with zeros:
 //
-//   positions  [vertex]            | x . . . |                          active vertices first, then those that stencils
-//   read lines      [active vertex]     | x . . . | H e_1 . | … | H e_d . | (Q_11 . | Q_12 . | …) |
-//              H = scale · F, Q likewise; one cache line for d = 3 in
-//              float without Q
-//   stencils   [entry]             weights g_1 … g_d (q_11, q_12, …) of x_j − x_v; neighbors j
-//   nodes      [run][node]         number of the vertex; a run is the points of one cell
-//   rest       [run][node][axis]   X_i − X_0
-//   chunks     [chunk]             one byte for at most chunk_size points of a run: their number, and last_chunk where
-//                                  the run ends; the loop over chunks has no branch that depends on the data
-//   local      [chunk][axis][point]   ξ_1 … ξ_d of the chunk's points
+//   positions  [vertex]         | x . . . |        active vertices first, then those that only stencils read
+//   lines      [active vertex]  | x . . . | H e_1 . | … | H e_d . | (Q_11 . | Q_12 . | …) |
+//                               H = scale · F, Q likewise; a cache line for d = 3 in float without Q
+//   stencils   [row][group]     a vertex's entries in groups of four: neighbors j [4]; weights [g_1 … g_d (q_11 …)][4]
+//                               of x_j − x_v; the vertex itself with weights of zero fills the last group
+//   nodes      [run][node]      number of the vertex; a run is the points of one cell
+//   rest       [run][node][axis] X_i − X_0
+//   local      [point][axis]    ξ_1 … ξ_d
+//   edges      of simplices: each edge once a window of window_size runs
+//     first    [window]         its first edge
+//     ends     [edge][2]        numbers of the vertices i, j
+//     vectors  [edge][axis]     X_j − X_i
+//     of_run   [run][pair]      number of the edge in its window, for the pairs of nodes as edge_number counts them
+//     reversed [run]            a bit a pair, set where the edge runs from the second node to the first
 //
-// Coefficients of a cell are a four each, in the order that monomials.hpp gives. They are written for a batch of cells
-// into a buffer of the first cache level before the first of them is read: a coefficient read right after its store
-// waits for the store.
+// A vector of results holds the columns of as many points as it has room for, in the order of memory (float, three
+// columns, sixteen lanes):   x y z x y z x y z x y z x y z .   It is stored whole, and the next overwrites what it
+// wrote too much. Coefficients are spread over lanes the same way once a cell; coordinates are spread once a vector of
+// points, by one permutation an axis from one load.
 //
-// Sources: vertex_stage.inl, simplex.inl (degree 1 and 2), cubic.inl, product.inl (elements that are no simplices),
-// each compiled for float and double by a file of its own and, in it, once for every instruction set; fours.inl and
-// points.inl are what they share.
+// Coefficients of cells that are not evaluated edge by edge stand in the order that monomials.hpp gives, a vector each,
+// for a batch of cells in a buffer of the first cache level.
+//
+// Sources: vertex_stage.inl, simplex.inl, cubic.inl (simplices with Hessians), product.inl (elements that are no
+// simplices), each compiled for float and double by a file of its own and, in it, once for every instruction set;
+// fours.inl and points.inl are what they share.
 #pragma once
 
 #include <array>
@@ -39,11 +47,6 @@ enum class Recipe : std::uint8_t {
   dual_taylor  ///< x, H = ⅔F, ⅙Q
 };
 
-/// Degree of the polynomial on a simplex.
-constexpr int polynomial_degree(Recipe recipe) {
-  return recipe == Recipe::linear ? 1 : recipe == Recipe::quadratic ? 2 : 3;
-}
-
 /// Number of weights of a stencil entry.
 constexpr int num_weights(Recipe recipe, int dim) {
   if (recipe == Recipe::linear) return 0;
@@ -56,11 +59,23 @@ inline constexpr int max_fast_columns = 3;
 inline constexpr int max_simplex_dim = 3;
 /// Numbers by which arrays that are read a whole vector at a time are longer than their content.
 inline constexpr int vector_padding = 16;
-/// Greatest number of points of a chunk: a cache line of them.
+/// Number of runs that share the list of their edges.
+inline constexpr Index window_size = 128;
+
+/// Number of edges of a simplex.
+constexpr int num_edges(int dim) { return dim * (dim + 1) / 2; }
+/// Number of the edge between nodes i < j: 01 02 … 0d 12 ….
+constexpr int edge_number(int dim, int i, int j) { return i * (2 * dim + 1 - i) / 2 + j - i - 1; }
+
+/// The edges of simplices, a window of runs at a time.
 template <class Scalar>
-inline constexpr Index chunk_size = static_cast<Index>(64 / sizeof(Scalar));
-/// Marks the last chunk of a run.
-inline constexpr std::uint8_t last_chunk = 0x80;
+struct Edges {
+  const Index* first;
+  const Index* ends;
+  const Scalar* vectors;
+  const std::uint16_t* of_run;
+  const std::uint8_t* reversed;
+};
 
 /// Memory aligned to cache lines.
 struct alignas(64) CacheLine {
@@ -70,8 +85,8 @@ struct alignas(64) CacheLine {
 /// Lines of the active vertices from stencils.
 template <class Scalar>
 struct VertexStage {
-  int num_weights;  ///< of an entry; as many fours follow x in a line
-  const Offset* offsets;
+  int num_weights;            ///< of an entry; as many fours follow x in a line
+  const Offset* first_group;  ///< [row]
   const Index* neighbors;
   const Scalar* weights;
   std::array<Scalar, 9> scale;  ///< factor of each weight
@@ -89,10 +104,9 @@ struct PointStage {
   Recipe recipe;
   const Index* nodes;
   const Scalar* rest;
-  const Index* first;        ///< [run] its first point
-  const Index* first_chunk;  ///< [run] its first chunk
-  const std::uint8_t* chunks;
+  const Index* first;  ///< [run] its first point
   const Scalar* local;
+  Edges<Scalar> edges;               ///< of simplices under the recipes quadratic and hermite
   const std::uint8_t* extrapolates;  ///< [run] 1 where a point lies outside its cell; null where none does
   const std::uint8_t* affine;        ///< [run] 1 where x(ξ) is affine; null for simplices, where it always is
   const Scalar* lines;
@@ -105,7 +119,7 @@ struct PointStage {
   void run(Index begin, Index end) const {
     if constexpr (!E::affine)
       run_product(E::vtk_id, begin, end);
-    else if (polynomial_degree(recipe) == 3)
+    else if (recipe == Recipe::dual_taylor)
       run_cubic(E::dim, begin, end);
     else
       run_simplex(E::dim, begin, end);

@@ -1,4 +1,4 @@
-// Simplices under the rules of degree three. A source file defines HALFGRAD_SCALAR and HWY_TARGET_INCLUDE, then
+// Simplices under dual_taylor. A source file defines HALFGRAD_SCALAR and HWY_TARGET_INCLUDE, then
 // includes this one; Highway includes that source once a target.
 #include <hwy/foreach_target.h>
 #include "framework/kernels/points.inl"
@@ -6,166 +6,117 @@
 HWY_BEFORE_NAMESPACE();
 namespace halfgrad::kernels::HWY_NAMESPACE {
 
-// f = Σ β_i x_i + Σ_{i<j} β_i β_j (S_ij + (β_i − β_j) T_ij) with S_ij = (H_i − H_j)(X_j − X_i) and
-// T_ij = x_i − x_j + (H_i + H_j)(X_j − X_i), and β_0 = 1 − Σ β_k put in.
-template <int d, class T>
-HWY_INLINE void set_up_hermite(const T* const* line, const T* rest, T* coefficients) {
-  using F = Four<T>;
-  using M = SimplexMonomials<3, d>;
-  constexpr int size = M::size;
-  F c[size], x[d + 1], h[d + 1][d];
-  HALFGRAD_UNROLL
-  for (int i = 0; i < size; ++i) c[i] = F::zero();
-  HALFGRAD_UNROLL
-  for (int i = 0; i <= d; ++i) {
-    x[i] = F::load(line[i]);
-    HALFGRAD_UNROLL
-    for (int a = 0; a < d; ++a) h[i][a] = F::load(line[i] + 4 * (1 + a));
-  }
-  c[M::constant] = x[0];
-  HALFGRAD_UNROLL
-  for (int k = 0; k < d; ++k) {
-    const F at_first = product<d>(h[0], rest + (k + 1) * d), at_second = product<d>(h[k + 1], rest + (k + 1) * d);
-    const F s = at_first - at_second, t = x[0] - x[k + 1] + at_first + at_second, u = s + t, both = u + t;
-    c[M::linear(k)] = c[M::linear(k)] + (x[k + 1] - x[0]) + u;
-    c[M::quadratic(k, k)] = c[M::quadratic(k, k)] - t;
-    HALFGRAD_UNROLL
-    for (int l = 0; l < d; ++l) {
-      c[M::quadratic(k, l)] = c[M::quadratic(k, l)] - both;
-      c[M::cubic(k, k, l)] = c[M::cubic(k, k, l)] + t;
-      HALFGRAD_UNROLL
-      for (int m = 0; m < d; ++m) c[M::cubic(k, l, m)] = c[M::cubic(k, l, m)] + t;
-    }
-  }
-  HALFGRAD_UNROLL
-  for (int k = 0; k < d; ++k) {
-    HALFGRAD_UNROLL
-    for (int l = k + 1; l < d; ++l) {
-      T edge[d];
-      HALFGRAD_UNROLL
-      for (int a = 0; a < d; ++a) edge[a] = rest[(l + 1) * d + a] - rest[(k + 1) * d + a];
-      const F at_first = product<d>(h[k + 1], edge), at_second = product<d>(h[l + 1], edge);
-      const F t = x[k + 1] - x[l + 1] + at_first + at_second;
-      c[M::quadratic(k, l)] = c[M::quadratic(k, l)] + (at_first - at_second);
-      c[M::cubic(k, k, l)] = c[M::cubic(k, k, l)] + t;
-      c[M::cubic(k, l, l)] = c[M::cubic(k, l, l)] - t;
-    }
-  }
-  HALFGRAD_UNROLL
-  for (int i = 0; i < size; ++i) c[i].store(coefficients + 4 * i);
-}
-
 // f = b_0 + Σ_m β_m (b_m − b_0) with the vertices' Taylor polynomials b_i = x_i + H_i d_i + d_iᵀ Q_i d_i,
-// d_i = Σ_k β_k E_k − E_i, E_k = X_k − X_0.
+// d_i = Σ_k β_k E_k − E_i, E_k = X_k − X_0. With p_i,k = H_i E_k, u_i,kk = E_kᵀ Q_i E_k and u_i,kl = 2 E_kᵀ Q_i E_l the
+// coefficients are
+//   1        x_0
+//   ξm       x_m − x_0 + p_0,m − p_m,m + u_m,mm
+//   ξmξm     p_m,m − p_0,m + u_0,mm − 2 u_m,mm
+//   ξmξk     (p_m,k − p_0,k) + (p_k,m − p_0,m) + u_0,mk − u_m,mk − u_k,mk
+//   ξmξmξm   v_m,mm                        with v_m = u_m − u_0
+//   ξmξmξk   v_m,mk + v_k,mm
+//   ξ1ξ2ξ3   v_1,23 + v_2,13 + v_3,12
 template <int d, class T>
-HWY_INLINE void set_up_dual_taylor(const T* const* line, const T* rest, T* coefficients) {
+HWY_INLINE void set_up_dual_taylor(const Spread<T, d>& spread, const T* const* line, const T* rest, T* coefficients) {
   using F = Four<T>;
   using M = SimplexMonomials<3, d>;
-  constexpr int size = M::size, symmetric = num_symmetric(d);
-  // Q : E_k E_lᵀ as coefficients of the entries of Q, of which those off the diagonal count twice already.
-  T pair[d][d][symmetric];
+  constexpr int symmetric = num_symmetric(d);
+  const auto store = [&](int place, const F& value)
+                         HWY_ATTR { spread.columns_of(value).store(coefficients + spread.size * place); };
+  // Factors of the entries of Q, of which those off the diagonal count twice already, in u_kl.
+  HWY_ALIGN T factor[symmetric][symmetric];
   HALFGRAD_UNROLL
-  for (int k = 0; k < d; ++k) {
+  for (int k = 0, pair = 0; k < d; ++k) {
     HALFGRAD_UNROLL
-    for (int l = k; l < d; ++l) {
+    for (int l = k; l < d; ++l, ++pair) {
       const T* e = rest + (k + 1) * d;
       const T* f = rest + (l + 1) * d;
       int entry = 0;
       HALFGRAD_UNROLL
       for (int a = 0; a < d; ++a) {
         HALFGRAD_UNROLL
-        for (int b = a; b < d; ++b) pair[k][l][entry++] = (e[a] * f[b] + e[b] * f[a]) / 2;
+        for (int b = a; b < d; ++b) factor[pair][entry++] = k == l ? e[a] * f[b] : e[a] * f[b] + e[b] * f[a];
       }
     }
   }
-  F c[size];
-  HALFGRAD_UNROLL
-  for (int i = 0; i < size; ++i) c[i] = F::zero();
-  const F x0 = F::load(line[0]);
-  F p0[d], w0[d][d];
+  // Place of the pair k ≤ l.
+  const auto pair = [](int k, int l) { return k * (2 * d - 1 - k) / 2 + l; };
+  F x0 = F::load(line[0]), p0[d], u0[symmetric], slope[d][d], v[d][symmetric], u_own[d][d];
   HALFGRAD_UNROLL
   for (int node = 0; node <= d; ++node) {
-    F h[d], q[symmetric], p[d], w[d][d];
+    F h[d], q[symmetric];
     HALFGRAD_UNROLL
     for (int a = 0; a < d; ++a) h[a] = F::load(line[node] + 4 * (1 + a));
     HALFGRAD_UNROLL
     for (int a = 0; a < symmetric; ++a) q[a] = F::load(line[node] + 4 * (1 + d + a));
     HALFGRAD_UNROLL
     for (int k = 0; k < d; ++k) {
-      p[k] = product<d>(h, rest + (k + 1) * d);
-      HALFGRAD_UNROLL
-      for (int l = k; l < d; ++l) w[k][l] = w[l][k] = product<symmetric>(q, pair[k][l]);
+      const F p = product<d>(h, rest + (k + 1) * d);
+      if (node == 0)
+        p0[k] = p;
+      else
+        slope[node - 1][k] = p - p0[k];
     }
-    if (node == 0) {
-      c[M::constant] = x0;
-      HALFGRAD_UNROLL
-      for (int k = 0; k < d; ++k) {
-        p0[k] = p[k];
-        c[M::linear(k)] = p[k] - x0;
-        HALFGRAD_UNROLL
-        for (int l = 0; l < d; ++l) {
-          w0[k][l] = w[k][l];
-          c[M::quadratic(k, l)] = c[M::quadratic(k, l)] + w[k][l];
-        }
-      }
-      continue;
-    }
-    const int m = node - 1;
-    c[M::linear(m)] = c[M::linear(m)] + (F::load(line[node]) - p[m] + w[m][m]);
     HALFGRAD_UNROLL
-    for (int k = 0; k < d; ++k) {
-      c[M::quadratic(m, k)] = c[M::quadratic(m, k)] + (p[k] - w[m][k] - w[m][k] - p0[k]);
-      HALFGRAD_UNROLL
-      for (int l = 0; l < d; ++l) c[M::cubic(m, k, l)] = c[M::cubic(m, k, l)] + (w[k][l] - w0[k][l]);
+    for (int kl = 0; kl < symmetric; ++kl) {
+      const F u = product<symmetric>(q, factor[kl]);
+      if (node == 0)
+        u0[kl] = u;
+      else
+        v[node - 1][kl] = u - u0[kl];
     }
   }
+  store(M::constant, x0);
   HALFGRAD_UNROLL
-  for (int i = 0; i < size; ++i) c[i].store(coefficients + 4 * i);
+  for (int m = 0; m < d; ++m) {
+    HALFGRAD_UNROLL
+    for (int k = 0; k < d; ++k) u_own[m][k] = v[m][pair(std::min(m, k), std::max(m, k))];
+    const F u = u_own[m][m] + u0[pair(m, m)], rise = slope[m][m] - u;
+    store(M::linear(m), F::load(line[m + 1]) - x0 - rise);
+    store(M::quadratic(m, m), rise - u_own[m][m]);
+    store(M::cubic(m, m, m), u_own[m][m]);
+  }
+  HALFGRAD_UNROLL
+  for (int m = 0; m < d; ++m) {
+    HALFGRAD_UNROLL
+    for (int k = m + 1; k < d; ++k) {
+      store(M::quadratic(m, k), slope[m][k] + slope[k][m] - u0[pair(m, k)] - u_own[m][k] - u_own[k][m]);
+      store(M::cubic(m, m, k), u_own[m][k] + v[k][pair(m, m)]);
+      store(M::cubic(m, k, k), u_own[k][m] + v[m][pair(k, k)]);
+    }
+  }
+  if constexpr (d == 3) store(M::cubic(0, 1, 2), v[0][pair(1, 2)] + v[1][pair(0, 2)] + v[2][pair(0, 1)]);
 }
 
-// Three columns are computed always, and those stored that there are: the code of fewer is not worth its time to
-// compile.
-template <Recipe recipe, int d, class T>
+template <int d, class T>
 void evaluate_cubics(const PointStage<T>& stage, Index begin, Index end) {
   using Monomials = SimplexMonomials<3, d>;
-  constexpr int stride = 4 * Monomials::size;
-  constexpr int line_length = 4 * (1 + num_weights(recipe, d));
-  const int columns = stage.num_columns;
+  constexpr int line_length = 4 * (1 + num_weights(Recipe::dual_taylor, d));
+  const Spread<T, d> spread(stage.num_columns);
+  constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
-  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * columns;
+  const Index num_whole = spread.num_whole(stage, end);
   for (Index batch = begin; batch < end; batch += batch_size) {
     const Index batch_end = std::min(batch + batch_size, end);
     T* target = coefficients;
     for (Index run = batch; run < batch_end; ++run, target += stride) {
       const T* line[d + 1];
       find_lines<d + 1, line_length>(stage, run, line);
-      const T* rest = stage.rest + static_cast<Offset>(run) * (d + 1) * d;
-      if constexpr (recipe == Recipe::hermite)
-        set_up_hermite<d>(line, rest, target);
-      else
-        set_up_dual_taylor<d>(line, rest, target);
+      set_up_dual_taylor<d>(spread, line, stage.rest + static_cast<Offset>(run) * (d + 1) * d, target);
     }
-    evaluate_chunks<Monomials, max_fast_columns>(stage, batch, batch_end, coefficients, stride, columns, limit);
-  }
-}
-
-template <Recipe recipe, class T>
-void with_dimension(const PointStage<T>& stage, int dim, Index begin, Index end) {
-  switch (dim) {
-    case 1:
-      return evaluate_cubics<recipe, 1>(stage, begin, end);
-    case 2:
-      return evaluate_cubics<recipe, 2>(stage, begin, end);
-    case 3:
-      return evaluate_cubics<recipe, 3>(stage, begin, end);
+    evaluate_polynomials<Monomials>(stage, spread, batch, batch_end, coefficients, stride, num_whole);
   }
 }
 
 void cubic_points(const PointStage<HALFGRAD_SCALAR>& stage, int dim, Index begin, Index end) {
-  if (stage.recipe == Recipe::hermite)
-    with_dimension<Recipe::hermite>(stage, dim, begin, end);
-  else
-    with_dimension<Recipe::dual_taylor>(stage, dim, begin, end);
+  switch (dim) {
+    case 1:
+      return evaluate_cubics<1>(stage, begin, end);
+    case 2:
+      return evaluate_cubics<2>(stage, begin, end);
+    case 3:
+      return evaluate_cubics<3>(stage, begin, end);
+  }
 }
 
 }  // namespace halfgrad::kernels::HWY_NAMESPACE

@@ -20,23 +20,24 @@ namespace halfgrad::kernels::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The columns of a vertex, in one vector where the target has vectors of four.
-template <class T>
-struct Four {
-  using Tag = hn::CappedTag<T, 4>;
+// `size` numbers in one vector, or in several where the target's vectors are shorter.
+template <class T, int size>
+struct Pack {
+  using Tag = hn::CappedTag<T, size>;
   using V = hn::Vec<Tag>;
   static constexpr int lanes = static_cast<int>(hn::MaxLanes(Tag()));
-  static constexpr int num_parts = 4 / lanes;
+  static constexpr int num_parts = size / lanes;
   V part[num_parts];
 
-  HWY_INLINE static Four zero() {
-    Four r;
+  HWY_INLINE static Pack zero() { return all(T(0)); }
+  HWY_INLINE static Pack all(T value) {
+    Pack r;
     HALFGRAD_UNROLL
-    for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Zero(Tag());
+    for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Set(Tag(), value);
     return r;
   }
-  HWY_INLINE static Four load(const T* from) {
-    Four r;
+  HWY_INLINE static Pack load(const T* from) {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Load(Tag(), from + p * lanes);
     return r;
@@ -45,39 +46,48 @@ struct Four {
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) hn::Store(part[p], Tag(), to + p * lanes);
   }
-  // this + other · factor
-  HWY_INLINE Four plus(const Four& other, T factor) const {
-    Four r;
+  HWY_INLINE void store_unaligned(T* to) const {
     HALFGRAD_UNROLL
-    for (int p = 0; p < num_parts; ++p) r.part[p] = hn::MulAdd(other.part[p], hn::Set(Tag(), factor), part[p]);
+    for (int p = 0; p < num_parts; ++p) hn::StoreU(part[p], Tag(), to + p * lanes);
+  }
+  // this + other · factor
+  HWY_INLINE Pack plus(const Pack& other, const Pack& factor) const {
+    Pack r;
+    HALFGRAD_UNROLL
+    for (int p = 0; p < num_parts; ++p) r.part[p] = hn::MulAdd(other.part[p], factor.part[p], part[p]);
     return r;
   }
+  HWY_INLINE Pack plus(const Pack& other, T factor) const { return plus(other, all(factor)); }
   // this − other · factor
-  HWY_INLINE Four minus(const Four& other, T factor) const {
-    Four r;
+  HWY_INLINE Pack minus(const Pack& other, T factor) const {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::NegMulAdd(other.part[p], hn::Set(Tag(), factor), part[p]);
     return r;
   }
-  HWY_INLINE Four operator+(const Four& other) const {
-    Four r;
+  HWY_INLINE Pack operator+(const Pack& other) const {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Add(part[p], other.part[p]);
     return r;
   }
-  HWY_INLINE Four operator-(const Four& other) const {
-    Four r;
+  HWY_INLINE Pack operator-(const Pack& other) const {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Sub(part[p], other.part[p]);
     return r;
   }
-  HWY_INLINE Four operator*(T factor) const {
-    Four r;
+  HWY_INLINE Pack operator*(T factor) const {
+    Pack r;
     HALFGRAD_UNROLL
     for (int p = 0; p < num_parts; ++p) r.part[p] = hn::Mul(part[p], hn::Set(Tag(), factor));
     return r;
   }
 };
+
+// The columns of a vertex, padded.
+template <class T>
+using Four = Pack<T, 4>;
 
 // Σ_a column_a · factor_a.
 template <int d, class T>
@@ -87,48 +97,6 @@ HWY_INLINE Four<T> product(const Four<T>* column, const T* factor) {
   for (int a = 1; a < d; ++a) sum = sum.plus(column[a], factor[a]);
   return sum;
 }
-
-// Whether one vector holds four fours: a block of lanes each, numbered from 0.
-template <class T>
-inline constexpr bool has_four_blocks = hn::MaxLanes(hn::ScalableTag<T>()) >= 16;
-
-// Operations on vectors of four blocks; used where has_four_blocks.
-template <class T>
-struct Blocks {
-  using Tag = hn::CappedTag<T, 16>;
-  using V = hn::Vec<Tag>;
-
-  // The four at `from` in every block.
-  HWY_INLINE static V duplicate(const T* from) { return hn::LoadDup128(Tag(), from); }
-  // Lane k of every block b is v[place[b]].
-  template <int place0, int place1, int place2, int place3>
-  HWY_INLINE static V spread(V v) {
-    alignas(64) static constexpr std::int32_t lane[16] = {place0, place0, place0, place0, place1, place1,
-                                                          place1, place1, place2, place2, place2, place2,
-                                                          place3, place3, place3, place3};
-    return hn::TableLookupLanes(v, hn::SetTableIndices(Tag(), lane));
-  }
-  // Block b is block from[b] of v.
-  template <int from0, int from1, int from2, int from3>
-  HWY_INLINE static V permute(V v) {
-    alignas(64) static constexpr std::int32_t lane[16] = {
-        4 * from0, 4 * from0 + 1, 4 * from0 + 2, 4 * from0 + 3, 4 * from1, 4 * from1 + 1, 4 * from1 + 2, 4 * from1 + 3,
-        4 * from2, 4 * from2 + 1, 4 * from2 + 2, 4 * from2 + 3, 4 * from3, 4 * from3 + 1, 4 * from3 + 2, 4 * from3 + 3};
-    return hn::TableLookupLanes(v, hn::SetTableIndices(Tag(), lane));
-  }
-  // Lanes of the blocks whose bits are set.
-  template <int blocks>
-  HWY_INLINE static hn::Mask<Tag> mask() {
-    constexpr auto bit = [](int b) { return (blocks >> b & 1) != 0 ? 15 : 0; };
-    alignas(8) static constexpr std::uint8_t bits[8] = {bit(0) | bit(1) << 4, bit(2) | bit(3) << 4};
-    return hn::LoadMaskBits(Tag(), bits);
-  }
-  // Blocks whose bits are set from `yes`, the others from `no`.
-  template <int blocks>
-  HWY_INLINE static V select(V yes, V no) {
-    return hn::IfThenElse(mask<blocks>(), yes, no);
-  }
-};
 
 }  // namespace halfgrad::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

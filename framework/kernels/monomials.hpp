@@ -15,15 +15,13 @@ using Exponents = std::array<int, d>;
 
 /// Monomials of total degree ≤ `max_degree`: what every rule is on a simplex, where β_k = ξ_k. Stored as
 ///   ξ1 … ξd | 1 | ξkξl with k ≤ l | ξkξlξm with k ≤ l ≤ m
-/// but for degree 2 in three variables, which the setup with vectors of sixteen stores as it computes them:
-///   ξ1 ξ2 ξ3 1 | ξ1ξ1 ξ1ξ2 ξ1ξ3 ξ2ξ3 | (ξ1ξ1) ξ2ξ2 ξ3ξ3 (0)
 template <int max_degree, int d>
 struct SimplexMonomials {
   static constexpr int dim = d;
   static constexpr int num_quadratic = max_degree < 2 ? 0 : d * (d + 1) / 2;
   static constexpr int num_cubic = max_degree < 3 ? 0 : d * (d + 1) * (d + 2) / 6;
-  /// Number of stored coefficients, in fours.
-  static constexpr int size = max_degree == 2 && d == 3 ? 12 : d + 1 + num_quadratic + num_cubic;
+  /// Number of coefficients.
+  static constexpr int size = d + 1 + num_quadratic + num_cubic;
 
   static constexpr int constant = d;
   static constexpr int linear(int k) { return k; }
@@ -43,11 +41,6 @@ struct SimplexMonomials {
         for (int l = k; l < d; ++l)
           for (int m = l; m < d; ++m, ++next)
             cubic[k][l][m] = cubic[k][m][l] = cubic[l][k][m] = cubic[l][m][k] = cubic[m][k][l] = cubic[m][l][k] = next;
-      if constexpr (max_degree == 2 && d == 3) {
-        quadratic[1][2] = quadratic[2][1] = 7;
-        quadratic[1][1] = 9;
-        quadratic[2][2] = 10;
-      }
     }
   };
   static constexpr Table table{};
@@ -110,7 +103,7 @@ struct ProductMonomials {
   static constexpr List list_ = make();
 
  public:
-  /// Number of coefficients, in fours.
+  /// Number of coefficients.
   static constexpr int size = list_.size;
   /// Place of a monomial, −1 where it is not in the set.
   static constexpr int place(const Exponents<dim>& exponents) {

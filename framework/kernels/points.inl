@@ -7,12 +7,104 @@
 #endif
 
 #include <algorithm>
+#include <type_traits>
 
 #include "framework/kernels/fours.inl"
 #include "framework/kernels/monomials.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace halfgrad::kernels::HWY_NAMESPACE {
+
+// ---- columns and points on the lanes of a vector
+
+// As many numbers as the target's vectors hold, four at least.
+template <class T>
+using Wide = Pack<T, std::max(4, static_cast<int>(hn::MaxLanes(hn::CappedTag<T, 16>())))>;
+
+// Places points and columns on the lanes of a vector: lane p · columns + c holds column c of point p, so that a vector
+// of results goes to memory as it stands. What lanes beyond the last point hold is not used.
+template <class T, int d>
+class Spread {
+ public:
+  using W = Wide<T>;
+  static constexpr int size = 4 * (sizeof(W) / sizeof(Four<T>));
+  // One point a vector where vectors are short: then coordinates are broadcast and coefficients stay as they are.
+  static constexpr bool single = size == 4;
+
+  HWY_INLINE explicit Spread(int columns) : num_points(single ? 1 : size / std::max(d, columns)) {
+    if constexpr (!single) {
+      HWY_ALIGN TI lane[size];
+      for (int l = 0; l < size; ++l) lane[l] = static_cast<TI>(l % columns);
+      column_ = hn::SetTableIndices(Tag(), lane);
+      HALFGRAD_UNROLL
+      for (int k = 0; k < d; ++k) {
+        for (int l = 0; l < size; ++l) lane[l] = static_cast<TI>(std::min(l / columns, num_points - 1) * d + k);
+        coordinate_[k] = hn::SetTableIndices(Tag(), lane);
+      }
+    }
+  }
+
+  // Columns of a vertex or coefficient on the lanes.
+  HWY_INLINE W columns_of(const Four<T>& four) const {
+#if HWY_TARGET != HWY_SCALAR
+    if constexpr (!single) {
+      W r;
+      r.part[0] = hn::TableLookupLanes(widened<size>(four.part[0]), column_);
+      return r;
+    }
+#endif
+    if constexpr (single) return four;
+  }
+
+  // ξ_1 … ξ_d of num_points points, of which `local` is the first; reads a whole vector.
+  HWY_INLINE void coordinates(const T* local, W* xi) const {
+    if constexpr (single) {
+      HALFGRAD_UNROLL
+      for (int k = 0; k < d; ++k) xi[k] = W::all(local[k]);
+    } else {
+      auto all = hn::LoadU(Tag(), local);
+#if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL
+      // Keeps the compiler from loading once an axis: loads that cross cache lines are what a linear frame waits for.
+      asm("" : "+x"(all.raw));
+#endif
+      HALFGRAD_UNROLL
+      for (int k = 0; k < d; ++k) xi[k].part[0] = hn::TableLookupLanes(all, coordinate_[k]);
+    }
+  }
+
+  // The number of points, counted from the first of stage.out, before which every vector of results that begins there
+  // may be stored whole: what a store writes too much, the next overwrites.
+  Index num_whole(const PointStage<T>& stage, Index end) const {
+    return stage.first[end] - (size + stage.num_columns - 1) / stage.num_columns;
+  }
+  // Before the end of the caller's range only the points are copied.
+  HWY_INLINE void store_bounded(const W& results, Index count, int columns, T* out) const {
+    HWY_ALIGN T rows[size];
+    results.store(rows);
+    std::copy_n(rows, std::min<Index>(count, num_points) * columns, out);
+  }
+
+  const int num_points;  // of a vector
+
+ private:
+  using Tag = hn::CappedTag<T, size>;
+  using TI = hn::TFromD<hn::RebindToSigned<Tag>>;
+  using Indices = decltype(hn::SetTableIndices(Tag(), static_cast<const TI*>(nullptr)));
+
+#if HWY_TARGET != HWY_SCALAR
+  // The four in the first lanes of a longer vector.
+  template <int to, class V>
+  HWY_INLINE static auto widened(V v) {
+    if constexpr (to == 4)
+      return v;
+    else
+      return hn::ZeroExtendVector(hn::CappedTag<T, to>(), widened<to / 2>(v));
+  }
+#endif
+
+  std::conditional_t<single, char, Indices> column_;
+  std::conditional_t<single, char, Indices> coordinate_[d];
+};
 
 // ---- Horner's scheme over a set of monomials that holds all divisors of its members
 
@@ -24,116 +116,65 @@ constexpr bool has_power() {
   return Monomials::place(exponents) >= 0;
 }
 
-template <class Monomials, int k, int power, int... before, class D, class V>
-HWY_INLINE V horner_from(D tag, const hn::TFromD<D>* c, const V* b);
+template <class Monomials, int k, int power, int... before, class T, class W>
+HWY_INLINE W horner_from(const T* c, const W* xi);
 
 // The factor of ξ_0^before_0 ξ_1^before_1 …: a polynomial in ξ_k, ξ_(k+1) ….
-template <class Monomials, int k, int... before, class D, class V>
-HWY_INLINE V horner(D tag, const hn::TFromD<D>* c, const V* b) {
+template <class Monomials, int k, int... before, class T, class W>
+HWY_INLINE W horner(const T* c, const W* xi) {
   if constexpr (k == Monomials::dim) {
     constexpr int place = Monomials::place({before...});
-    return hn::Set(tag, c[4 * place]);
+    return W::load(c + Spread<T, Monomials::dim>::size * place);
   } else {
-    return horner_from<Monomials, k, 0, before...>(tag, c, b);
+    return horner_from<Monomials, k, 0, before...>(c, xi);
   }
 }
 
 // Σ_{e ≥ power} ξ_k^(e − power) · (factor of ξ_k^e)
-template <class Monomials, int k, int power, int... before, class D, class V>
-HWY_INLINE V horner_from(D tag, const hn::TFromD<D>* c, const V* b) {
-  const V lowest = horner<Monomials, k + 1, before..., power>(tag, c, b);
+template <class Monomials, int k, int power, int... before, class T, class W>
+HWY_INLINE W horner_from(const T* c, const W* xi) {
+  const W lowest = horner<Monomials, k + 1, before..., power>(c, xi);
   if constexpr (has_power<Monomials, k, power + 1, before...>())
-    return hn::MulAdd(b[k], horner_from<Monomials, k, power + 1, before...>(tag, c, b), lowest);
+    return lowest.plus(xi[k], horner_from<Monomials, k, power + 1, before...>(c, xi));
   else
     return lowest;
 }
 
-// ---- results
-
-// Lanes of x, y, z to packed rows x y z x y z …
-template <class D, class V>
-HWY_INLINE void store_three(D tag, const V* v, hn::TFromD<D>* out) {
-#if HWY_TARGET == HWY_AVX3
-  // Two permutations a vector; the general routine needs about three times as many.
-  if constexpr (sizeof(hn::TFromD<D>) == 4) {
-    const __m512i xy0 = _mm512_setr_epi32(0, 16, 0, 1, 17, 0, 2, 18, 0, 3, 19, 0, 4, 20, 0, 5);
-    const __m512i xy1 = _mm512_setr_epi32(21, 0, 6, 22, 0, 7, 23, 0, 8, 24, 0, 9, 25, 0, 10, 26);
-    const __m512i xy2 = _mm512_setr_epi32(0, 11, 27, 0, 12, 28, 0, 13, 29, 0, 14, 30, 0, 15, 31, 0);
-    const __m512i z0 = _mm512_setr_epi32(0, 0, 0, 0, 0, 1, 0, 0, 2, 0, 0, 3, 0, 0, 4, 0);
-    const __m512i z1 = _mm512_setr_epi32(0, 5, 0, 0, 6, 0, 0, 7, 0, 0, 8, 0, 0, 9, 0, 0);
-    const __m512i z2 = _mm512_setr_epi32(10, 0, 0, 11, 0, 0, 12, 0, 0, 13, 0, 0, 14, 0, 0, 15);
-    const auto merge = [&](__m512i xy, __mmask16 mask, __m512i z) {
-      return _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(v[0].raw, xy, v[1].raw), mask, z, v[2].raw);
-    };
-    _mm512_storeu_ps(out, merge(xy0, 0x4924, z0));
-    _mm512_storeu_ps(out + 16, merge(xy1, 0x2492, z1));
-    _mm512_storeu_ps(out + 32, merge(xy2, 0x9249, z2));
-  } else {
-    const __m512i xy0 = _mm512_setr_epi64(0, 8, 0, 1, 9, 0, 2, 10);
-    const __m512i xy1 = _mm512_setr_epi64(0, 3, 11, 0, 4, 12, 0, 5);
-    const __m512i xy2 = _mm512_setr_epi64(13, 0, 6, 14, 0, 7, 15, 0);
-    const __m512i z0 = _mm512_setr_epi64(0, 0, 0, 0, 0, 1, 0, 0);
-    const __m512i z1 = _mm512_setr_epi64(2, 0, 0, 3, 0, 0, 4, 0);
-    const __m512i z2 = _mm512_setr_epi64(0, 5, 0, 0, 6, 0, 0, 7);
-    const auto merge = [&](__m512i xy, __mmask8 mask, __m512i z) {
-      return _mm512_mask_permutexvar_pd(_mm512_permutex2var_pd(v[0].raw, xy, v[1].raw), mask, z, v[2].raw);
-    };
-    _mm512_storeu_pd(out, merge(xy0, 0x24, z0));
-    _mm512_storeu_pd(out + 8, merge(xy1, 0x49, z1));
-    _mm512_storeu_pd(out + 16, merge(xy2, 0x92, z2));
+// Calls value(xi) for each vector of a run's points and stores what it returns.
+template <int d, class T, class Value>
+HWY_INLINE void evaluate_points(const PointStage<T>& stage, const Spread<T, d>& spread, Index run, Index num_whole,
+                                Value&& value) {
+  const int columns = stage.num_columns, step = spread.num_points;
+  const T* local = stage.local + static_cast<Offset>(stage.first[run]) * d;
+  T* out = stage.out + static_cast<Offset>(stage.first[run]) * columns;
+  Index left = stage.first[run + 1] - stage.first[run];
+  // Two loops: a test for the end of the range in the first costs a tenth of a frame.
+  Index bounded = std::clamp(stage.first[run + 1] - num_whole, 0, left);
+  for (; left > bounded; left -= step, local += step * d, out += step * columns) {
+    Wide<T> xi[d];
+    spread.coordinates(local, xi);
+    value(xi).store_unaligned(out);
   }
-#else
-  hn::StoreInterleaved3(v[0], v[1], v[2], tag, out);
-#endif
-}
-template <int computed, class D, class V>
-HWY_INLINE void store_rows(D tag, const V* v, int columns, hn::TFromD<D>* out) {
-  if (computed == 1 || columns == 1) return hn::StoreU(v[0], tag, out);
-  if constexpr (computed >= 2)
-    if (computed == 2 || columns == 2) return hn::StoreInterleaved2(v[0], v[1], tag, out);
-  if constexpr (computed == 3) store_three(tag, v, out);
+  for (; HWY_UNLIKELY(left > 0); left -= step, local += step * d, out += step * columns) {
+    Wide<T> xi[d];
+    spread.coordinates(local, xi);
+    spread.store_bounded(value(xi), left, columns, out);
+  }
 }
 
-// The points of a batch of runs, whose coefficients stand `stride` apart. Vectors are stored whole: what a chunk's last
-// store writes too much, the next chunk overwrites; before `limit` ends the range of the caller, only the points are
-// copied. `computed` ≥ columns of the values.
-template <class Monomials, int computed, class T>
-HWY_INLINE void evaluate_chunks(const PointStage<T>& stage, Index begin, Index end, const T* coefficients, int stride,
-                                int columns, const T* limit) {
-  constexpr int d = Monomials::dim;
-  const hn::ScalableTag<T> tag;
-  using V = hn::Vec<decltype(tag)>;
-  constexpr int lanes = std::min<int>(chunk_size<T>, static_cast<int>(hn::MaxLanes(tag)));
-  const std::uint8_t* const last = stage.chunks + stage.first_chunk[end];
-  const T* local = stage.local + static_cast<Offset>(stage.first[begin]) * d;
-  T* out = stage.out + static_cast<Offset>(stage.first[begin]) * columns;
-  for (const std::uint8_t* chunk = stage.chunks + stage.first_chunk[begin]; chunk != last; ++chunk) {
-    const int count = *chunk & (last_chunk - 1);
-    for (int p = 0; p < count; p += lanes) {
-      V b[d], v[computed];
-      HALFGRAD_UNROLL
-      for (int k = 0; k < d; ++k) b[k] = hn::LoadU(tag, local + k * count + p);
-      HALFGRAD_UNROLL
-      for (int c = 0; c < computed; ++c) v[c] = horner<Monomials, 0>(tag, coefficients + c, b);
-      T* const row = out + p * columns;
-      if (HWY_LIKELY(limit - row >= lanes * columns)) {
-        store_rows<computed>(tag, v, columns, row);
-      } else {
-        HWY_ALIGN T rows[lanes * computed];
-        store_rows<computed>(tag, v, columns, rows);
-        std::copy_n(rows, std::min(count - p, lanes) * columns, row);
-      }
-      if constexpr (lanes == chunk_size<T>) break;
-    }
-    local += d * count;
-    out += columns * count;
-    coefficients += (*chunk & last_chunk) != 0 ? stride : 0;
-  }
+// The points of runs whose coefficients, spread over lanes, stand `stride` apart.
+template <class Monomials, class T>
+HWY_INLINE void evaluate_polynomials(const PointStage<T>& stage, const Spread<T, Monomials::dim>& spread, Index begin,
+                                     Index end, const T* coefficients, int stride, Index num_whole) {
+  for (Index run = begin; run < end; ++run, coefficients += stride)
+    evaluate_points<Monomials::dim>(stage, spread, run, num_whole,
+                                    [&](const Wide<T>* xi) HWY_ATTR { return horner<Monomials, 0>(coefficients, xi); });
 }
 
 // ---- runs
 
-constexpr int batch_size = 16;
+// Runs whose coefficients are computed before the first of them is read.
+constexpr int batch_size = 8;
 
 // Lines of a run's nodes.
 template <int num_nodes, int line_length, class T>
@@ -147,10 +188,13 @@ HWY_INLINE void find_lines(const PointStage<T>& stage, Index run, const T** line
 // (1 − 1/n)/2 · |(H_i − H_j)(X_j − X_i)| for the pair of nodes where that is greatest (Binding::correction_bound). A
 // NaN is not bounded, nor is a cell with points outside.
 template <int num_nodes, int d, class T>
-HWY_NOINLINE bool is_within_tolerance(const PointStage<T>& stage, Index run, const T* const* line) {
+HWY_NOINLINE bool is_within_tolerance(const PointStage<T>& stage, Index run) {
   if (stage.extrapolates != nullptr && stage.extrapolates[run] != 0) return false;
+  const T* line[num_nodes];
+  find_lines<num_nodes, 4 * (1 + d)>(stage, run, line);
   const T* rest = stage.rest + static_cast<Offset>(run) * num_nodes * d;
-  const T longest = stage.tolerance * 2 * num_nodes / (num_nodes - 1);
+  // Relative to it, so that squares of short lengths do not vanish in float.
+  const T per_longest = 1 / (stage.tolerance * 2 * num_nodes / (num_nodes - 1));
   for (int i = 0; i < num_nodes; ++i)
     for (int j = 0; j < i; ++j) {
       T squared = 0;
@@ -158,9 +202,10 @@ HWY_NOINLINE bool is_within_tolerance(const PointStage<T>& stage, Index run, con
         T component = 0;
         for (int k = 0; k < d; ++k)
           component += (line[i][4 * (1 + k) + c] - line[j][4 * (1 + k) + c]) * (rest[j * d + k] - rest[i * d + k]);
+        component *= per_longest;
         squared += component * component;
       }
-      if (!(squared <= longest * longest)) return false;
+      if (!(squared <= 1)) return false;
     }
   return true;
 }

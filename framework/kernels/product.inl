@@ -40,18 +40,19 @@ HWY_INLINE void unrolled(Function&& f) {
 
 // Linear interpolation; other coefficients than its own stay as they are.
 template <class E, Factor factor, class T>
-HWY_INLINE void set_up_shape(const T* const* line, T* coefficients) {
+HWY_INLINE void set_up_shape(const Spread<T, E::dim>& spread, const T* const* line, T* coefficients) {
   using F = Four<T>;
   using M = ProductMonomials<E, factor>;
   F x[E::num_nodes];
   HALFGRAD_UNROLL
   for (int i = 0; i < E::num_nodes; ++i) x[i] = F::load(line[i]);
-  unrolled<M::num_shape>(
-      [&](auto m) HWY_ATTR { combination<E, m()>(x, F::zero()).store(coefficients + 4 * M::product(m(), 0)); });
+  unrolled<M::num_shape>([&](auto m) HWY_ATTR {
+    spread.columns_of(combination<E, m()>(x, F::zero())).store(coefficients + spread.size * M::product(m(), 0));
+  });
 }
 
 template <class E, Factor factor, class T>
-HWY_INLINE void set_up_blend(const T* const* line, const T* rest, T* coefficients) {
+HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* line, const T* rest, T* coefficients) {
   using F = Four<T>;
   using M = ProductMonomials<E, factor>;
   constexpr int n = E::num_nodes, d = E::dim;
@@ -89,78 +90,71 @@ HWY_INLINE void set_up_blend(const T* const* line, const T* rest, T* coefficient
     });
   });
   HALFGRAD_UNROLL
-  for (int i = 0; i < M::size; ++i) sum[i].store(coefficients + 4 * i);
+  for (int i = 0; i < M::size; ++i) spread.columns_of(sum[i]).store(coefficients + spread.size * i);
 }
 
 // ---- runs
 
-template <class E, int computed, class T>
+template <class E, class T>
 void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
   using Monomials = ProductMonomials<E, Factor::none>;
-  constexpr int stride = 4 * Monomials::size;
+  const Spread<T, E::dim> spread(stage.num_columns);
+  constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
-  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * stage.num_columns;
+  const Index num_whole = spread.num_whole(stage, end);
   for (Index batch = begin; batch < end; batch += batch_size) {
     const Index batch_end = std::min(batch + batch_size, end);
     T* target = coefficients;
     for (Index run = batch; run < batch_end; ++run, target += stride) {
       const T* line[E::num_nodes];
       find_lines<E::num_nodes, 4>(stage, run, line);
-      set_up_shape<E, Factor::none>(line, target);
+      set_up_shape<E, Factor::none>(spread, line, target);
     }
-    evaluate_chunks<Monomials, computed>(stage, batch, batch_end, coefficients, stride, stage.num_columns, limit);
+    evaluate_polynomials<Monomials>(stage, spread, batch, batch_end, coefficients, stride, num_whole);
   }
 }
 
-template <class E, Factor factor, int computed, class T>
-HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, Index begin, Index end, const T* limit) {
+template <class E, Factor factor, class T>
+HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, Index begin, Index end, Index num_whole) {
   using Monomials = ProductMonomials<E, factor>;
-  constexpr int stride = 4 * Monomials::size;
+  const Spread<T, E::dim> spread(stage.num_columns);
+  constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
   T* target = coefficients;
   for (Index run = begin; run < end; ++run, target += stride) {
     const T* line[E::num_nodes];
     find_lines<E::num_nodes, 4 * (1 + E::dim)>(stage, run, line);
-    if (HWY_UNLIKELY(stage.tolerance > 0) && is_within_tolerance<E::num_nodes, E::dim>(stage, run, line)) {
+    if (HWY_UNLIKELY(stage.tolerance > 0) && is_within_tolerance<E::num_nodes, E::dim>(stage, run)) {
       std::fill(target, target + stride, T(0));
-      set_up_shape<E, factor>(line, target);
+      set_up_shape<E, factor>(spread, line, target);
     } else {
-      set_up_blend<E, factor>(line, stage.rest + static_cast<Offset>(run) * E::num_nodes * E::dim, target);
+      set_up_blend<E, factor>(spread, line, stage.rest + static_cast<Offset>(run) * E::num_nodes * E::dim, target);
     }
   }
-  evaluate_chunks<Monomials, computed>(stage, begin, end, coefficients, stride, stage.num_columns, limit);
+  evaluate_polynomials<Monomials>(stage, spread, begin, end, coefficients, stride, num_whole);
 }
 
-template <class E, int computed, class T>
+template <class E, class T>
 void evaluate_blend(const PointStage<T>& stage, Index begin, Index end) {
-  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * stage.num_columns;
+  const Index num_whole = Spread<T, E::dim>(stage.num_columns).num_whole(stage, end);
   for (Index batch = begin; batch < end; batch += batch_size) {
     const Index batch_end = std::min(batch + batch_size, end);
     const bool affine = std::all_of(stage.affine + batch, stage.affine + batch_end, [](auto a) { return a != 0; });
     if (affine)
-      evaluate_blend_batch<E, Factor::affine, computed>(stage, batch, batch_end, limit);
+      evaluate_blend_batch<E, Factor::affine>(stage, batch, batch_end, num_whole);
     else
-      evaluate_blend_batch<E, Factor::shape, computed>(stage, batch, batch_end, limit);
+      evaluate_blend_batch<E, Factor::shape>(stage, batch, batch_end, num_whole);
   }
-}
-
-// Fewer columns than `computed` are stored, not computed: dim columns or three serve all.
-template <class E, int computed, class T>
-void with_recipe(const PointStage<T>& stage, Index begin, Index end) {
-  if (stage.recipe == Recipe::linear)
-    evaluate_linear<E, computed>(stage, begin, end);
-  else
-    evaluate_blend<E, computed>(stage, begin, end);
 }
 
 void product_points(const PointStage<HALFGRAD_SCALAR>& stage, int vtk_id, Index begin, Index end) {
   Elements::for_each([&]<class E>() {
     if constexpr (PolynomialElement<E> && !E::affine) {
       if (E::vtk_id != vtk_id) return;
-      if (E::dim < max_fast_columns && stage.num_columns <= E::dim)
-        with_recipe<E, std::min<int>(E::dim, max_fast_columns)>(stage, begin, end);
+      if (stage.recipe == Recipe::linear)
+        evaluate_linear<E>(stage, begin, end);
       else
-        with_recipe<E, max_fast_columns>(stage, begin, end);
+        evaluate_blend<E>(stage, begin, end);
     }
   });
 }

@@ -1,4 +1,4 @@
-// Simplices under the rules of degree one and two. A source file defines HALFGRAD_SCALAR and HWY_TARGET_INCLUDE, then
+// Simplices under the rules that take no Hessians. A source file defines HALFGRAD_SCALAR and HWY_TARGET_INCLUDE, then
 // includes this one; Highway includes that source once a target.
 #include <hwy/foreach_target.h>
 #include "framework/kernels/points.inl"
@@ -6,139 +6,132 @@
 HWY_BEFORE_NAMESPACE();
 namespace halfgrad::kernels::HWY_NAMESPACE {
 
-// ---- setup of a cell: coefficients from the lines of its nodes
+// With β_0 = 1 − Σ β_k and the bulge S_ij = (H_i − H_j)(X_j − X_i) of an edge, a blend is
+//   f = Σ_i β_i (x_i + H_i (X − X_i)) = Σ_i β_i x_i + Σ_{i<j} β_i β_j S_ij
+//     = x_0 + Σ_k β_k (x_k − x_0 + β_0 S_0k + Σ_{l>k} β_l S_kl).
+// Hermite has S_ij + (β_i − β_j) T_ij in place of S_ij, T_ij = x_i − x_j + (H_i + H_j)(X_j − X_i).
+// Both are computed once for all cells of a window that share the edge. S does not depend on the direction in which a
+// cell runs along it, T changes its sign.
 
-template <int d, class T>
-HWY_INLINE void set_up_linear(const T* const* line, T* coefficients) {
-  using M = SimplexMonomials<1, d>;
-  if constexpr (has_four_blocks<T> && d == 3) {
-    // | x_1 | x_2 | x_3 | x_0 | − | x_0 | x_0 | x_0 | 0 |
-    using B = Blocks<T>;
-    const auto x0 = B::duplicate(line[0]);
-    auto x = B::template select<2>(B::duplicate(line[2]), B::duplicate(line[1]));
-    x = B::template select<4>(B::duplicate(line[3]), x);
-    hn::Store(B::template select<8>(x0, hn::Sub(x, x0)), typename B::Tag(), coefficients);
-  } else {
-    using F = Four<T>;
-    const F x0 = F::load(line[0]);
-    x0.store(coefficients + 4 * M::constant);
-    HALFGRAD_UNROLL
-    for (int k = 0; k < d; ++k) (F::load(line[k + 1]) - x0).store(coefficients + 4 * M::linear(k));
-  }
-}
+// Vectors of an edge.
+template <Recipe recipe>
+constexpr int num_edge_vectors = recipe == Recipe::linear    ? 0
+                                 : recipe == Recipe::hermite ? 2
+                                                             : 1;
 
-// With R_kl = (H_k − H_0)(X_l − X_0):  f = x_0 + Σ_k β_k (x_k − x_0 − R_kk) + Σ_kl β_k β_l R_kl.
-template <int d, class T>
-HWY_INLINE void set_up_quadratic(const T* const* line, const T* rest, T* coefficients) {
+// S, or S and T, of a window, spread over lanes.
+template <Recipe recipe, int d, class T>
+HWY_INLINE void set_up_edges(const PointStage<T>& stage, const Spread<T, d>& spread, Index window, T* vectors) {
   using F = Four<T>;
-  using M = SimplexMonomials<2, d>;
-  const F x0 = F::load(line[0]);
-  x0.store(coefficients + 4 * M::constant);
-  F first[d], r[d][d];
-  HALFGRAD_UNROLL
-  for (int a = 0; a < d; ++a) first[a] = F::load(line[0] + 4 * (1 + a));
-  HALFGRAD_UNROLL
-  for (int k = 0; k < d; ++k) {
-    F difference[d];
+  constexpr int line_length = 4 * (1 + d);
+  for (Offset e = stage.edges.first[window]; e < stage.edges.first[window + 1]; ++e) {
+    const T* const a = stage.lines + line_length * static_cast<Offset>(stage.edges.ends[2 * e]);
+    const T* const b = stage.lines + line_length * static_cast<Offset>(stage.edges.ends[2 * e + 1]);
+    const T* const along = stage.edges.vectors + d * e;
+    F s = (F::load(a + 4) - F::load(b + 4)) * along[0];
     HALFGRAD_UNROLL
-    for (int a = 0; a < d; ++a) difference[a] = F::load(line[k + 1] + 4 * (1 + a)) - first[a];
-    HALFGRAD_UNROLL
-    for (int l = 0; l < d; ++l) r[k][l] = product<d>(difference, rest + (l + 1) * d);
-    (F::load(line[k + 1]) - x0 - r[k][k]).store(coefficients + 4 * M::linear(k));
-    r[k][k].store(coefficients + 4 * M::quadratic(k, k));
-  }
-  HALFGRAD_UNROLL
-  for (int k = 0; k < d; ++k) {
-    HALFGRAD_UNROLL
-    for (int l = k + 1; l < d; ++l) (r[k][l] + r[l][k]).store(coefficients + 4 * M::quadratic(k, l));
+    for (int k = 1; k < d; ++k) s = s.plus(F::load(a + 4 * (1 + k)) - F::load(b + 4 * (1 + k)), along[k]);
+    spread.columns_of(s).store(vectors);
+    vectors += spread.size;
+    if constexpr (recipe == Recipe::hermite) {
+      F t = F::load(a) - F::load(b);
+      HALFGRAD_UNROLL
+      for (int k = 0; k < d; ++k) t = t.plus(F::load(a + 4 * (1 + k)) + F::load(b + 4 * (1 + k)), along[k]);
+      spread.columns_of(t).store(vectors);
+      vectors += spread.size;
+    }
   }
 }
 
-// The same for tetrahedra in vectors of four blocks. With P_i = | H_i E_1 | H_i E_2 | H_i E_3 | 0 | and R_k = P_k −
-// P_0:
-//   | x_1 − x_0 − R_11 | x_2 − x_0 − R_22 | x_3 − x_0 − R_33 | x_0         |
-//   | R_11             | R_12 + R_21      | R_13 + R_31      | R_23 + R_32 |
-//   | R_11             | R_22             | R_33             | 0           |
-template <class T>
-HWY_INLINE void set_up_quadratic_in_blocks(const T* const* line, const T* rest, T* coefficients) {
-  using B = Blocks<T>;
-  using V = typename B::V;
-  const typename B::Tag tag;
-  const V edges = hn::LoadU(tag, rest);
-  const V e0 = B::template spread<3, 6, 9, 0>(edges), e1 = B::template spread<4, 7, 10, 1>(edges),
-          e2 = B::template spread<5, 8, 11, 2>(edges);
-  V p0 = hn::Mul(B::duplicate(line[0] + 4), e0);
-  p0 = hn::MulAdd(B::duplicate(line[0] + 8), e1, p0);
-  p0 = hn::MulAdd(B::duplicate(line[0] + 12), e2, p0);
-  V r[4];
+// The points of a run under a recipe whose lines are `line_length` long; recipe linear reads no edges.
+template <Recipe recipe, int line_length, int d, class T>
+HWY_INLINE void evaluate_run(const PointStage<T>& stage, const Spread<T, d>& spread, Index run, const T* vectors,
+                             Index num_whole) {
+  using W = Wide<T>;
+  constexpr int edges = num_edges(d), stride = num_edge_vectors<recipe> * spread.size;
+  const Index* const node = stage.nodes + static_cast<Offset>(run) * (d + 1);
+  W x[d + 1], s[edges], t[edges];
   HALFGRAD_UNROLL
-  for (int k = 1; k < 4; ++k) {
-    r[k] = hn::MulSub(B::duplicate(line[k] + 4), e0, p0);
-    r[k] = hn::MulAdd(B::duplicate(line[k] + 8), e1, r[k]);
-    r[k] = hn::MulAdd(B::duplicate(line[k] + 12), e2, r[k]);
+  for (int i = 0; i <= d; ++i)
+    x[i] = spread.columns_of(Four<T>::load(stage.lines + static_cast<Offset>(node[i]) * line_length));
+  HALFGRAD_UNROLL
+  for (int k = 1; k <= d; ++k) x[k] = x[k] - x[0];
+  if constexpr (recipe != Recipe::linear) {
+    const std::uint16_t* const edge = stage.edges.of_run + static_cast<Offset>(run) * edges;
+    HALFGRAD_UNROLL
+    for (int e = 0; e < edges; ++e) {
+      const T* const from = vectors + stride * edge[e];
+      s[e] = W::load(from);
+      if constexpr (recipe == Recipe::hermite)
+        t[e] = W::load(from + spread.size) * ((stage.edges.reversed[run] >> e & 1) != 0 ? T(-1) : T(1));
+    }
   }
-  const V diagonal = B::template select<4>(r[3], B::template select<2>(r[2], r[1]));
-  const V x0 = B::duplicate(line[0]);
-  V x = B::template select<2>(B::duplicate(line[2]), B::duplicate(line[1]));
-  x = B::template select<4>(B::duplicate(line[3]), x);
-  const V upper = B::template select<8>(B::template permute<0, 0, 0, 2>(r[2]), r[1]);
-  const V lower = B::template select<12>(B::template permute<0, 0, 0, 1>(r[3]), B::template permute<0, 0, 0, 0>(r[2]));
-  hn::Store(B::template select<8>(x0, hn::Sub(hn::Sub(x, x0), diagonal)), tag, coefficients);
-  hn::Store(hn::IfThenElse(B::template mask<14>(), hn::Add(upper, lower), upper), tag, coefficients + 16);
-  hn::Store(diagonal, tag, coefficients + 32);
-}
-
-// ---- runs
-
-template <Recipe recipe, int d, int columns, class T>
-void evaluate_runs(const PointStage<T>& stage, Index begin, Index end) {
-  using Linear = SimplexMonomials<1, d>;
-  using Monomials = SimplexMonomials<polynomial_degree(recipe), d>;
-  constexpr int stride = 4 * Monomials::size;
-  constexpr int line_length = 4 * (1 + num_weights(recipe, d));
-  HWY_ALIGN T coefficients[batch_size * stride];
-  const T* const limit = stage.out + static_cast<Offset>(stage.first[end]) * columns;
-  for (Index batch = begin; batch < end; batch += batch_size) {
-    const Index batch_end = std::min(batch + batch_size, end);
-    bool all_linear = recipe == Recipe::quadratic && stage.tolerance > 0;
-    T* target = coefficients;
-    for (Index run = batch; run < batch_end; ++run, target += stride) {
-      const T* line[d + 1];
-      find_lines<d + 1, line_length>(stage, run, line);
-      if constexpr (recipe == Recipe::linear) {
-        set_up_linear<d>(line, target);
-      } else {
-        const T* rest = stage.rest + static_cast<Offset>(run) * (d + 1) * d;
-        if constexpr (has_four_blocks<T> && d == 3)
-          set_up_quadratic_in_blocks(line, rest, target);
-        else
-          set_up_quadratic<d>(line, rest, target);
-        if (HWY_UNLIKELY(stage.tolerance > 0)) {
-          if (is_within_tolerance<d + 1, d>(stage, run, line)) {
-            set_up_linear<d>(line, target);
-            std::fill(target + 4 * Linear::size, target + stride, T(0));
-          } else {
-            all_linear = false;
-          }
+  evaluate_points<d>(stage, spread, run, num_whole, [&](const W* xi) HWY_ATTR {
+    W value = x[0], beta[d + 1];
+    beta[0] = W::all(T(1)) - xi[0];
+    HALFGRAD_UNROLL
+    for (int k = 1; k <= d; ++k) beta[k] = xi[k - 1];
+    if constexpr (d > 1) {
+      W others = xi[1];
+      HALFGRAD_UNROLL
+      for (int k = 2; k < d; ++k) others = others + xi[k];
+      beta[0] = beta[0] - others;
+    }
+    HALFGRAD_UNROLL
+    for (int k = d; k >= 1; --k) {
+      W slope = x[k];
+      if constexpr (recipe != Recipe::linear) {
+        HALFGRAD_UNROLL
+        for (int step = 0; step < d - k + 1; ++step) {
+          const int other = step < d - k ? d - step : 0;  // β_0 comes last: it is there last
+          const int e = edge_number(d, std::min(k, other), std::max(k, other));
+          W bulge = s[e];
+          if constexpr (recipe == Recipe::hermite)
+            bulge = bulge.plus(t[e], other == 0 ? beta[0] - beta[k] : beta[k] - beta[other]);
+          slope = slope.plus(beta[other], bulge);
         }
       }
+      value = value.plus(beta[k], slope);
     }
-    if (recipe == Recipe::quadratic && all_linear)
-      evaluate_chunks<Linear, columns>(stage, batch, batch_end, coefficients, stride, columns, limit);
-    else
-      evaluate_chunks<Monomials, columns>(stage, batch, batch_end, coefficients, stride, columns, limit);
+    return value;
+  });
+}
+
+// is_within_tolerance from the edges' vectors S.
+template <int d, class T>
+HWY_NOINLINE bool is_within_tolerance_of_edges(const PointStage<T>& stage, Index run, const T* vectors) {
+  if (stage.extrapolates != nullptr && stage.extrapolates[run] != 0) return false;
+  // Relative to the tolerance, so that squares of short lengths do not vanish in float.
+  const T per_longest = 1 / (stage.tolerance * 2 * (d + 1) / d);
+  for (int e = 0; e < num_edges(d); ++e) {
+    const T* const s = vectors + Spread<T, d>::size * stage.edges.of_run[static_cast<Offset>(run) * num_edges(d) + e];
+    T squared = 0;
+    for (int c = 0; c < stage.num_columns; ++c) {
+      const T component = s[c] * per_longest;
+      squared += component * component;
+    }
+    if (!(squared <= 1)) return false;
   }
+  return true;
 }
 
 template <Recipe recipe, int d, class T>
-void with_columns(const PointStage<T>& stage, Index begin, Index end) {
-  switch (stage.num_columns) {
-    case 1:
-      return evaluate_runs<recipe, d, 1>(stage, begin, end);
-    case 2:
-      return evaluate_runs<recipe, d, 2>(stage, begin, end);
-    case 3:
-      return evaluate_runs<recipe, d, 3>(stage, begin, end);
+void evaluate_runs(const PointStage<T>& given, Index begin, Index end) {
+  const PointStage<T> stage = given;  // a copy, so that stores to the results do not make its members be read again
+  constexpr int line_length = 4 * (1 + num_weights(recipe, d));
+  const Spread<T, d> spread(stage.num_columns);
+  const Index num_whole = spread.num_whole(stage, end);
+  const bool with_tolerance = recipe == Recipe::quadratic && stage.tolerance > 0;
+  HWY_ALIGN T vectors[window_size * num_edges(d) * num_edge_vectors<recipe> * spread.size + 1];
+  for (Index run = begin; run < end;) {
+    const Index window = run / window_size, window_end = std::min(end, (window + 1) * window_size);
+    if constexpr (recipe != Recipe::linear) set_up_edges<recipe, d>(stage, spread, window, vectors);
+    for (; run < window_end; ++run) {
+      if (HWY_UNLIKELY(with_tolerance) && is_within_tolerance_of_edges<d>(given, run, vectors))
+        evaluate_run<Recipe::linear, line_length>(stage, spread, run, vectors, num_whole);
+      else
+        evaluate_run<recipe, line_length>(stage, spread, run, vectors, num_whole);
+    }
   }
 }
 
@@ -146,19 +139,23 @@ template <Recipe recipe, class T>
 void with_dimension(const PointStage<T>& stage, int dim, Index begin, Index end) {
   switch (dim) {
     case 1:
-      return with_columns<recipe, 1>(stage, begin, end);
+      return evaluate_runs<recipe, 1>(stage, begin, end);
     case 2:
-      return with_columns<recipe, 2>(stage, begin, end);
+      return evaluate_runs<recipe, 2>(stage, begin, end);
     case 3:
-      return with_columns<recipe, 3>(stage, begin, end);
+      return evaluate_runs<recipe, 3>(stage, begin, end);
   }
 }
 
 void simplex_points(const PointStage<HALFGRAD_SCALAR>& stage, int dim, Index begin, Index end) {
-  if (stage.recipe == Recipe::linear)
-    with_dimension<Recipe::linear>(stage, dim, begin, end);
-  else
-    with_dimension<Recipe::quadratic>(stage, dim, begin, end);
+  switch (stage.recipe) {
+    case Recipe::linear:
+      return with_dimension<Recipe::linear>(stage, dim, begin, end);
+    case Recipe::hermite:
+      return with_dimension<Recipe::hermite>(stage, dim, begin, end);
+    default:
+      return with_dimension<Recipe::quadratic>(stage, dim, begin, end);
+  }
 }
 
 }  // namespace halfgrad::kernels::HWY_NAMESPACE

@@ -1,6 +1,8 @@
 // Lines of the active vertices (cell_polynomial.hpp). A source file defines HALFGRAD_SCALAR and HWY_TARGET_INCLUDE,
 // then includes this one; Highway includes that source once a target.
 #include <hwy/foreach_target.h>
+#include <algorithm>
+
 #include "framework/kernels/fours.inl"
 
 HWY_BEFORE_NAMESPACE();
@@ -15,11 +17,15 @@ void vertex_lines(const VertexStage<T>& stage, Index begin, Index end) {
     F sum[width];
     HALFGRAD_UNROLL
     for (int k = 0; k < width; ++k) sum[k] = F::zero();
-    for (Offset e = stage.offsets[row]; e < stage.offsets[row + 1]; ++e) {
-      const F difference = F::load(stage.positions + 4 * static_cast<Offset>(stage.neighbors[e])) - own;
-      const T* weight = stage.weights + e * width;
+    for (Offset group = stage.first_group[row]; group < stage.first_group[row + 1]; ++group) {
+      const Index* const neighbor = stage.neighbors + 4 * group;
+      const T* const weight = stage.weights + 4 * width * group;
       HALFGRAD_UNROLL
-      for (int k = 0; k < width; ++k) sum[k] = sum[k].plus(difference, weight[k]);
+      for (int e = 0; e < 4; ++e) {
+        const F difference = F::load(stage.positions + 4 * static_cast<Offset>(neighbor[e])) - own;
+        HALFGRAD_UNROLL
+        for (int k = 0; k < width; ++k) sum[k] = sum[k].plus(difference, weight[4 * k + e]);
+      }
     }
     T* line = stage.lines + static_cast<Offset>(row) * 4 * (1 + width);
     own.store(line);
@@ -28,32 +34,69 @@ void vertex_lines(const VertexStage<T>& stage, Index begin, Index end) {
   }
 }
 
-// The same for three weights in vectors of four blocks: a line is one vector, and so is what an entry adds to it,
-//   | 0 | g_1 (x_j − x_v) | g_2 (x_j − x_v) | g_3 (x_j − x_v) |
-template <class T>
-void vertex_lines_in_blocks(const VertexStage<T>& stage, Index begin, Index end) {
-  using B = Blocks<T>;
-  const typename B::Tag tag;
-  const auto scale = hn::Set(tag, stage.scale[0]);
-  const auto add = [&](Offset e, auto own, auto sum) HWY_ATTR {
-    const auto difference = hn::Sub(B::duplicate(stage.positions + 4 * static_cast<Offset>(stage.neighbors[e])), own);
-    const auto weight = B::template spread<0, 0, 1, 2>(B::duplicate(stage.weights + 3 * e));
-    return hn::MulAdd(difference, weight, sum);
-  };
+#if HWY_TARGET == HWY_AVX3
+// The same with a group's entries in the four blocks of a vector,
+//   | x_a − x_v | x_b − x_v | x_c − x_v | x_d − x_v |
+// times their weights k, so that an entry takes half the permutations of one vector an entry. The blocks of the sums
+// are added at the end of a row.
+HWY_INLINE __m512 transposed_sum(__m512 a, __m512 b, __m512 c, __m512 d) {
+  const __m512 ab = _mm512_add_ps(_mm512_shuffle_f32x4(a, b, 0x44), _mm512_shuffle_f32x4(a, b, 0xee));
+  const __m512 cd = _mm512_add_ps(_mm512_shuffle_f32x4(c, d, 0x44), _mm512_shuffle_f32x4(c, d, 0xee));
+  return _mm512_add_ps(_mm512_shuffle_f32x4(ab, cd, 0x88), _mm512_shuffle_f32x4(ab, cd, 0xdd));
+}
+
+template <int width>
+void vertex_lines_in_blocks(const VertexStage<float>& given, Index begin, Index end) {
+  constexpr int num_fours = 1 + width, num_vectors = (num_fours + 3) / 4,
+                last_fours = num_fours - 4 * (num_vectors - 1);
+  const VertexStage<float> stage = given;
+  HWY_ALIGN float factors[16 * num_vectors] = {1, 1, 1, 1};
+  for (int k = 0; k < width; ++k) std::fill_n(factors + 4 * (1 + k), 4, stage.scale[static_cast<std::size_t>(k)]);
+  const __m512i each_four = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+  const auto position = [&](Index vertex)
+                            HWY_ATTR { return _mm_load_ps(stage.positions + 4 * static_cast<Offset>(vertex)); };
   for (Index row = begin; row < end; ++row) {
-    const auto own = B::duplicate(stage.positions + 4 * static_cast<Offset>(row));
-    auto even = hn::Zero(tag), odd = hn::Zero(tag);
-    Offset e = stage.offsets[row];
-    const Offset last = stage.offsets[row + 1];
-    for (; e + 1 < last; e += 2) {
-      even = add(e, own, even);
-      odd = add(e + 1, own, odd);
+    const __m512 own = _mm512_broadcast_f32x4(position(row));
+    // sum[0] is the position, which stands in one block.
+    __m512 sum[4 * num_vectors];
+    HALFGRAD_UNROLL
+    for (int k = 1; k < 4 * num_vectors; ++k) sum[k] = _mm512_setzero_ps();
+    sum[0] = _mm512_maskz_mov_ps(0xf, own);
+    for (Offset group = stage.first_group[row]; group < stage.first_group[row + 1]; ++group) {
+      const Index* const neighbor = stage.neighbors + 4 * group;
+      const float* const weight = stage.weights + 4 * width * group;
+      const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(position(neighbor[0])), position(neighbor[1]), 1);
+      const __m256 high = _mm256_insertf128_ps(_mm256_castps128_ps256(position(neighbor[2])), position(neighbor[3]), 1);
+      const __m512 difference = _mm512_sub_ps(_mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1), own);
+      HALFGRAD_UNROLL
+      for (int k = 0; k < width; ++k) {
+        const __m512 weights = _mm512_castps128_ps512(_mm_loadu_ps(weight + 4 * k));
+        sum[1 + k] = _mm512_fmadd_ps(difference, _mm512_permutexvar_ps(each_four, weights), sum[1 + k]);
+      }
     }
-    if (e < last) even = add(e, own, even);
-    const auto line = B::template select<1>(own, hn::Mul(hn::Add(even, odd), scale));
-    hn::Store(line, tag, stage.lines + 16 * static_cast<Offset>(row));
+    float* const line = stage.lines + static_cast<Offset>(row) * 4 * num_fours;
+    HALFGRAD_UNROLL
+    for (int v = 0; v < num_vectors; ++v) {
+      const __m512 fours = _mm512_mul_ps(transposed_sum(sum[4 * v], sum[4 * v + 1], sum[4 * v + 2], sum[4 * v + 3]),
+                                         _mm512_load_ps(factors + 16 * v));
+      constexpr auto lanes = [](int fours_stored) { return static_cast<__mmask16>((1u << 4 * fours_stored) - 1); };
+      if (v + 1 < num_vectors || last_fours == 4)
+        _mm512_storeu_ps(line + 16 * v, fours);
+      else
+        _mm512_mask_storeu_ps(line + 16 * v, lanes(last_fours), fours);
+    }
   }
 }
+template <int width>
+void vertex_lines_in_blocks(const VertexStage<double>& stage, Index begin, Index end) {
+  vertex_lines<width>(stage, begin, end);
+}
+#else
+template <int width, class T>
+void vertex_lines_in_blocks(const VertexStage<T>& stage, Index begin, Index end) {
+  vertex_lines<width>(stage, begin, end);
+}
+#endif
 
 template <class T>
 void run_vertex_stage(const VertexStage<T>& stage, Index begin, Index end) {
@@ -61,16 +104,13 @@ void run_vertex_stage(const VertexStage<T>& stage, Index begin, Index end) {
     case 1:
       return vertex_lines<1>(stage, begin, end);
     case 2:
-      return vertex_lines<2>(stage, begin, end);
+      return vertex_lines_in_blocks<2>(stage, begin, end);
     case 3:
-      if constexpr (has_four_blocks<T>)
-        return vertex_lines_in_blocks(stage, begin, end);
-      else
-        return vertex_lines<3>(stage, begin, end);
+      return vertex_lines_in_blocks<3>(stage, begin, end);
     case 5:
       return vertex_lines<5>(stage, begin, end);
     case 9:
-      return vertex_lines<9>(stage, begin, end);
+      return vertex_lines_in_blocks<9>(stage, begin, end);
   }
 }
 

@@ -20,7 +20,7 @@ expect() {  # expect LINE WORD...: the words are among what completes the last w
 }
 
 source <("$program" describe bash)
-expect "halfgrad " deform run export info list check
+expect "halfgrad " deform run export info list check stress
 expect "halfgrad de" deform describe
 expect "halfgrad --th" --threads
 expect "halfgrad deform --re" --rest --reconstructor --report
@@ -31,6 +31,7 @@ expect "halfgrad deform --normals --ta" --tangents
 expect "halfgrad bind --interpolant attr" attribute_transfer
 expect "halfgrad deform --ta" --tangents
 expect "halfgrad list re" reconstructors
+expect "halfgrad stress --element te" tetrahedron
 expect "halfgrad --quiet deform --outside n" nearest
 COMP_WORDS=(halfgrad deform --rest "")
 COMP_CWORD=3

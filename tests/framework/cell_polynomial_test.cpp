@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include "framework/interpolant.hpp"
+#include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
 #include "support/test_meshes.hpp"
 
@@ -78,8 +79,8 @@ double largest_difference(const Values<Scalar>& result, const Values<double>& ex
 }
 
 template <Element E, class Scalar>
-void expect_fast_equals_plain(double jitter = 0.2) {
-  const Mesh mesh = test::lattice<E>(3, jitter, 5);
+void expect_fast_equals_plain(double jitter = 0.2, int cells = 3) {
+  const Mesh mesh = test::lattice<E>(cells, jitter, 5);
   const Embedding embedding = mixed_points<E>(mesh);
   const Reconstruction reconstruction =
       ChandrashekarGarg().reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
@@ -114,6 +115,37 @@ void expect_fast_equals_plain(double jitter = 0.2) {
   }
 }
 
+// The blend's weight is a smooth function of a ratio of mismatches, which are small differences of large numbers:
+// round-off grows by the ratio of their sizes.
+template <Element E, class Scalar>
+void expect_blend_equals_plain() {
+  const Mesh mesh = test::lattice<E>(3, 0.2, 5);
+  const Embedding embedding = mixed_points<E>(mesh);
+  const Reconstruction reconstruction = Adaptive().reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+  const Points waves = (3 * mesh.vertices() * random_values(E::dim, 3, 6)).array().sin();
+  for (Eigen::Index columns = 1; columns <= 3; ++columns) {
+    const Values<double> values = waves.leftCols(columns).cast<Scalar>().template cast<double>();
+    for (const char* rule : {"phong", "hermite"}) {
+      SCOPED_TRACE(fmt::format("{} with {} columns", rule, columns));
+      const Interpolant<Scalar> fast(mesh, embedding, named_rule(rule), &reconstruction);
+      const Values<double> expected = Interpolant<double>(mesh, embedding, named_rule(rule), &reconstruction)
+                                          .evaluate(values, {.kernel = Kernel::plain});
+      on_every_target([&] {
+        EXPECT_LT(largest_difference(fast.evaluate(values.template cast<Scalar>()), expected), 30 * tolerated<Scalar>);
+      });
+    }
+  }
+}
+
+TEST(CellPolynomial, BlendEqualsThePlainFormulas) {
+  expect_blend_equals_plain<Segment, float>();
+  expect_blend_equals_plain<Segment, double>();
+  expect_blend_equals_plain<Triangle, float>();
+  expect_blend_equals_plain<Triangle, double>();
+  expect_blend_equals_plain<Tetrahedron, float>();
+  expect_blend_equals_plain<Tetrahedron, double>();
+}
+
 TEST(CellPolynomial, EqualsThePlainFormulasOnSegments) {
   expect_fast_equals_plain<Segment, float>();
   expect_fast_equals_plain<Segment, double>();
@@ -125,6 +157,11 @@ TEST(CellPolynomial, EqualsThePlainFormulasOnTriangles) {
 TEST(CellPolynomial, EqualsThePlainFormulasOnTetrahedra) {
   expect_fast_equals_plain<Tetrahedron, float>();
   expect_fast_equals_plain<Tetrahedron, double>();
+}
+// Edges are shared within windows of cells: several windows, the last of them not full.
+TEST(CellPolynomial, EqualsThePlainFormulasInManyWindows) {
+  expect_fast_equals_plain<Tetrahedron, float>(0.2, 6);
+  expect_fast_equals_plain<Triangle, float>(0.2, 16);
 }
 
 // Without jitter the cells' maps are affine, and fewer coefficients serve.
@@ -144,6 +181,37 @@ TEST(CellPolynomial, EqualsThePlainFormulasOnHexahedra) {
   for (double jitter : {0.2, 0.0}) {
     expect_fast_equals_plain<Hexahedron, float>(jitter);
     expect_fast_equals_plain<Hexahedron, double>(jitter);
+  }
+}
+
+// Past the number of points from which a frame takes several threads: ranges of windows meet where threads do.
+TEST(CellPolynomial, OneAndTwoThreadsGiveTheSameBitsOnEveryTarget) {
+  const Mesh mesh = test::lattice<Tetrahedron>(8, 0.2, 5);
+  std::mt19937 random(4);
+  std::uniform_int_distribution<Index> any_cell(0, mesh.num_cells() - 1);
+  constexpr Index num_points = 250'000;
+  Embedding embedding;
+  embedding.gdim = 3;
+  embedding.local.resize(num_points, 3);
+  embedding.status.assign(num_points, PointStatus::inside);
+  for (Index p = 0; p < num_points; ++p) {
+    embedding.local.row(p) = test::random_inside<Tetrahedron>(random).transpose();
+    embedding.cells.push_back(any_cell(random));
+  }
+  const Reconstruction reconstruction =
+      ChandrashekarGarg().reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+  const Values<float> values = random_values(mesh.num_vertices(), 3, 1).cast<float>();
+  for (const char* rule : {"linear", "phong", "hermite"}) {
+    SCOPED_TRACE(rule);
+    const Interpolant<float> interpolant(mesh, embedding, named_rule(rule), &reconstruction);
+    on_every_target([&] {
+      Values<float> results[2];
+      for (std::size_t threads : {1, 2}) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        results[threads - 1] = interpolant.evaluate(values);
+      }
+      EXPECT_TRUE(results[0] == results[1]);
+    });
   }
 }
 

@@ -1,0 +1,71 @@
+// The edges of simplices in windows of consecutive runs, as the frame reads them (kernels/cell_polynomial.hpp).
+#pragma once
+
+#include <array>
+#include <utility>
+#include <vector>
+
+#include "framework/kernels/cell_polynomial.hpp"
+
+namespace halfgrad {
+
+template <class Scalar>
+struct EdgeWindows {
+  std::vector<Index> first;
+  std::vector<std::array<Index, 2>> ends;
+  std::vector<Scalar> vectors;
+  std::vector<std::uint16_t> of_run;
+  std::vector<std::uint8_t> reversed;
+
+  kernels::Edges<Scalar> view() const {
+    return {first.data(), ends.data()->data(), vectors.data(), of_run.data(), reversed.data()};
+  }
+};
+
+/// `nodes` are the vertices of each run, `rest` their positions relative to the first.
+template <int dim, class Scalar, class Nodes, class Rest>
+EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Rest& rest) {
+  constexpr int num_edges = kernels::num_edges(dim);
+  // Open addressing; a slot of an earlier window counts as empty. Twice the edges that a window can have, or more.
+  struct Slot {
+    std::array<Index, 2> ends;
+    Index edge = -1;
+  };
+  constexpr unsigned bits = 11;
+  static_assert((1 << bits) >= 2 * num_edges * kernels::window_size);
+  std::vector<Slot> slots(std::size_t{1} << bits);
+  const auto num_runs = static_cast<Index>(nodes.size());
+  EdgeWindows<Scalar> result;
+  result.of_run.reserve(nodes.size() * num_edges);
+  result.reversed.reserve(nodes.size());
+  for (Index run = 0; run < num_runs; ++run) {
+    const auto num_before = static_cast<Index>(result.ends.size());
+    if (run % kernels::window_size == 0) result.first.push_back(num_before);
+    const Index window_begin = result.first.back();
+    result.reversed.push_back(0);
+    for (int i = 0; i < dim; ++i)
+      for (int j = i + 1; j <= dim; ++j) {
+        const auto [low, high] = std::minmax(nodes[run][i], nodes[run][j]);
+        const std::array<Index, 2> ends{low, high};
+        std::uint64_t at =
+            (static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint32_t>(high)) * 0x9e3779b97f4a7c15ull >>
+            (64 - bits);
+        while (slots[at].edge >= window_begin && slots[at].ends != ends) at = (at + 1) & (slots.size() - 1);
+        if (slots[at].edge < window_begin) {
+          slots[at] = {ends, static_cast<Index>(result.ends.size())};
+          result.ends.push_back({nodes[run][i], nodes[run][j]});
+          for (int k = 0; k < dim; ++k) result.vectors.push_back(rest[run][j][k] - rest[run][i][k]);
+        }
+        result.of_run.push_back(static_cast<std::uint16_t>(slots[at].edge - window_begin));
+        if (result.ends[slots[at].edge][0] != nodes[run][i])
+          result.reversed.back() |= static_cast<std::uint8_t>(1 << kernels::edge_number(dim, i, j));
+      }
+  }
+  result.first.push_back(static_cast<Index>(result.ends.size()));
+  result.ends.shrink_to_fit();
+  result.vectors.resize(result.vectors.size() + kernels::vector_padding);
+  result.vectors.shrink_to_fit();
+  return result;
+}
+
+}  // namespace halfgrad

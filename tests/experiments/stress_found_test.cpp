@@ -1,0 +1,193 @@
+// What the stress test found, each as the plainest case that shows it.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "framework/cell_locator.hpp"
+#include "framework/embedding.hpp"
+#include "framework/interpolant.hpp"
+#include "reconstruction/kriging_system.hpp"
+#include "reconstruction/registry.hpp"
+#include "tests/support/test_meshes.hpp"
+
+namespace halfgrad {
+namespace {
+
+Mesh triangles(Points vertices, std::vector<std::array<Index, 3>> cells) {
+  ElementBlock<Triangle> block;
+  block.cells.resize(static_cast<Eigen::Index>(cells.size()), 3);
+  for (std::size_t c = 0; c < cells.size(); ++c)
+    for (int i = 0; i < 3; ++i) block.cells(static_cast<Eigen::Index>(c), i) = cells[c][i];
+  return Mesh(std::move(vertices), {block});
+}
+
+Points unit_triangle() {
+  Points vertices(3, 2);
+  vertices << 0, 0, 1, 0, 0, 1;
+  return vertices;
+}
+
+// Every facet belonged to two cells, so that there was no boundary for points outside.
+TEST(StressFound, ACellAndItsDoubleHaveABoundary) {
+  const Mesh mesh = triangles(unit_triangle(), {{0, 1, 2}, {1, 2, 0}});
+  Points points(1, 2);
+  points << -1, 0.25;
+  const Embedding embedding = embed(mesh, points, {.outside = Outside::nearest});
+  ASSERT_EQ(embedding.outside.size(), 1u);
+  EXPECT_NEAR(embedding.outside[0].distance, 1, 1e-15);
+}
+
+// |F Σ e ⊗ g − I| was ε / height², with height² next to ε for a needle of 1e7 to 1 along the diagonal of space.
+TEST(StressFound, ObliqueNeedlesKeepAffineValues) {
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  for (const double height : {1e-3, 1e-5, 1e-6}) {
+    Eigen::Matrix<double, 4, 3> positions;
+    positions << 0, 0, 0, 1, 0, 0, 0.3, height, 0, 0.4, 0, height;
+    positions = (positions * turn.transpose()).eval();
+    const CellGradient cell = cell_gradient<Tetrahedron>(positions);
+    ASSERT_GT(cell.volume, 0) << height;
+    const Eigen::Matrix3d product = positions.transpose() * cell.weights;
+    EXPECT_LT((product - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff(), 1e-15 * 20 / height) << height;
+  }
+}
+
+// Squares of float values of 1e-25 are zero, and 0/0 is NaN; those of 1e25 are infinite.
+TEST(StressFound, AdaptiveBlendsFloatsOfAnySize) {
+  for (const double scale : {1e-25, 1e25}) {
+    const Mesh unit = test::lattice<Tetrahedron>(2, 0.2, 1);
+    const Mesh mesh(unit.vertices() * scale, unit.blocks());
+    const Points points = test::random_points_inside(unit, 20, 1) * scale;
+    const Embedding embedding = embed(mesh, points);
+    const Reconstruction rows = make_reconstructor("adaptive")
+                                    .reconstructor->reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+    const Interpolant<float> phong(mesh, embedding, named_rule("phong"), &rows);
+    const Values<float> deformed =
+        (scale * (unit.vertices().array() + unit.vertices().array().square())).cast<float>().matrix();
+    EXPECT_TRUE(phong.evaluate(deformed).allFinite()) << scale;
+  }
+}
+
+// The squared bound of a correction of 1e-25 was zero in float: every cell was linear, whatever the tolerance.
+TEST(StressFound, TolerancesHoldForFloatsOfAnySize) {
+  for (const double scale : {1.0, 1e-25}) {
+    const Mesh unit = test::lattice<Tetrahedron>(2, 0.2, 1);
+    const Mesh mesh(unit.vertices() * scale, unit.blocks());
+    const Points points = test::random_points_inside(unit, 50, 1) * scale;
+    const Embedding embedding = embed(mesh, points);
+    const Reconstruction rows =
+        make_reconstructor("kriging").reconstructor->reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+    const Interpolant<float> phong(mesh, embedding, named_rule("phong"), &rows);
+    const Values<float> deformed = (scale * unit.vertices().array().square()).cast<float>().matrix();
+    const double tolerance = 1e-3 * scale;
+    const Values<float> exact = phong.evaluate(deformed), rough = phong.evaluate(deformed, {.tolerance = tolerance});
+    for (Index p = 0; p < exact.rows(); ++p)
+      EXPECT_LE((exact.row(p) - rough.row(p)).cast<double>().norm(), tolerance * (1 + 1e-4)) << scale;
+  }
+}
+
+// Beyond 2^53 a centroid rounds to its cell's first vertex: 1 / distance was infinite and its quotient NaN.
+TEST(StressFound, CentroidsThatRoundToAVertexGiveFiniteWeights) {
+  const Points vertices = (2 * unit_triangle()).array() + 1e16;
+  const Mesh mesh = triangles(vertices, {{0, 1, 2}});
+  for (const char* name : {"inverse_distance", "chandrashekar_garg", "knn"}) {
+    const Reconstruction rows = make_reconstructor(name).reconstructor->reconstruct(CellGradients(mesh), std::array{0});
+    ASSERT_EQ(rows.stencils.num_entries(), 2) << name;
+    for (const double weight : rows.stencils.weights) EXPECT_TRUE(std::isfinite(weight)) << name;
+  }
+}
+
+// Where J is singular at the closest point, weights start farther inside and go the rest of the way by their gradient.
+// A point within the tolerance of the boundary lost that rest.
+TEST(StressFound, PointsAtACollapsedCornerStayThere) {
+  Points vertices(4, 2);
+  vertices << 0, 0, 1, 0, 1, 1, 1, 1;
+  ElementBlock<Quadrilateral> block;
+  block.cells.resize(1, 4);
+  block.cells << 0, 1, 2, 3;
+  const Mesh mesh(vertices, {block});
+  Points points(1, 2);
+  points << 1 + 1e-10, 1 + 1e-10;
+  const Embedding embedding = embed(mesh, points);
+  ASSERT_EQ(embedding.status[0], PointStatus::boundary);
+  const Eigen::RowVector2d found =
+      Quadrilateral::shape(embedding.local.row(0).transpose()).transpose() * vertices.leftCols<2>();
+  EXPECT_LT((found - points.row(0)).norm(), 1e-9);
+}
+
+// Vertices of flat cells alone had stencils of 1e12 and more, made of the rounding across their plane.
+TEST(StressFound, VerticesWithoutVolumeHaveNoGradient) {
+  Points vertices(6, 2);
+  vertices << unit_triangle(), 5.1, 5.3, 6.1, 6.3, 7.1, 7.3;
+  const Mesh mesh = triangles(vertices, {{0, 1, 2}, {3, 4, 5}});
+  for (const nlohmann::json& drift : {"quadratic", "cubic"}) {
+    const Reconstruction rows = make_reconstructor({{"kriging", {{"drift", drift}}}})
+                                    .reconstructor->reconstruct(CellGradients(mesh), std::array{0, 4});
+    EXPECT_EQ(rows.stencils.diagnostics[0].rule, StencilRule::cell_value);
+    EXPECT_EQ(rows.stencils.diagnostics[1].rule, StencilRule::none);
+    EXPECT_EQ(rows.stencils.offsets[2], rows.stencils.offsets[1]);
+  }
+}
+
+// Near points and others 1e5 times as far: the quadratic and cubic modes, of 1e10 and 1e15, left 1e-7 in the linear
+// ones, and Hessians of affine values.
+TEST(StressFound, FitsOverUnequalDistancesKeepAffineValues) {
+  Eigen::MatrixXd points(2, 24);
+  for (int j = 0; j < 24; ++j) {
+    const double radius = std::pow(10, 5 * (j / 23.0)), angle = 2.4 * j;
+    points.col(j) << radius * std::cos(angle), radius * std::sin(angle);
+  }
+  KrigingFit fit;
+  KrigingSystem(2, 3).solve(points, fit);
+  const Eigen::Matrix2d gradient = fit.gradient * points.transpose();
+  EXPECT_LT((gradient - Eigen::Matrix2d::Identity()).norm(), 1e-12 * (1 + fit.absolute_sum));
+  const double magnitude = (fit.hessian.cwiseAbs() * points.cwiseAbs().transpose()).maxCoeff();
+  EXPECT_LT((fit.hessian * points.transpose()).cwiseAbs().maxCoeff(), 1e-12 * (1 + magnitude));
+}
+
+// Twenty cubic modes of four dimensions overran the memory for ten.
+TEST(StressFound, CubicFitsInFourDimensions) {
+  Eigen::MatrixXd points(4, 160);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(-2, 2);
+  for (Eigen::Index k = 0; k < points.size(); ++k) points.data()[k] = uniform(random);
+  KrigingFit fit;
+  KrigingSystem(4, 3).solve(points, fit);
+  EXPECT_LT((fit.gradient * points.transpose() - Eigen::Matrix4d::Identity()).norm(), 1e-10);
+  EXPECT_LT(fit.quadratic_response, 1e-8);
+}
+
+// A sliver of 1e-9, and a needle of 1e-6 oblique to the axes: the first must hold its centroid, and weights in the
+// second must reproduce positions.
+TEST(StressFound, SliversHoldTheirPointsAndNeedlesReproduceThem) {
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  Eigen::Matrix<double, 4, 3> sliver, needle;
+  sliver << 0, 0, 0, 1, 0, 1e-9, 0, 1, 1e-9, 1, 1, 0;
+  needle << 0, 0, 0, 1, 0, 0, 0.3, 1e-6, 0, 0.4, 0, 1e-6;
+  ElementBlock<Tetrahedron> block;
+  block.cells.resize(1, 4);
+  block.cells << 0, 1, 2, 3;
+  for (const auto& shape : {sliver, needle}) {
+    const Eigen::Matrix<double, 4, 3> turned = shape * turn.transpose();
+    const Mesh mesh(Points(turned), {block});
+    Points points(20, 3);
+    std::mt19937 random(2);
+    std::uniform_real_distribution<double> uniform(0.1, 1);
+    for (Index p = 0; p < 20; ++p) {
+      Eigen::RowVector4d beta;
+      for (int i = 0; i < 4; ++i) beta[i] = uniform(random);
+      points.row(p) = beta / beta.sum() * turned;
+    }
+    const CellLocations found = locate(mesh, points, 1e-9);
+    for (Index p = 0; p < 20; ++p) {
+      ASSERT_EQ(found.cells[p], 0);
+      const Eigen::Vector4d beta = Tetrahedron::shape(found.local.row(p).transpose());
+      EXPECT_LT((beta.transpose() * turned - points.row(p)).norm(), 1e-12);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace halfgrad
