@@ -166,8 +166,8 @@ class InverseMap {
     if (!result.converged) return false;
     const double margin = E::margin(result.xi);
     if (margin >= 0 || one_to_one(margin)) return true;
-    return (margin >= -hair || !CubeElement<E>)&&one_signed_ &&
-           scaled_jacobian(result.xi).determinant() * determinant_ > 0;
+    if (CubeElement<E> && margin < -hair) return false;
+    return one_signed_ && scaled_jacobian(result.xi).determinant() * determinant_ > 0;
   }
 
   // Whether |J_c⁻¹ J − I| < 1, so that the map is one to one, in the reference cell scaled about its center until it
