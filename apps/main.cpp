@@ -218,7 +218,10 @@ int dispatch(int argc, char** argv) {
       ->add_option("--frames", options.frames,
                    "Deformed vertices: .npy .pc2 .pvd, or a pattern of files (x.%04d.vtu, frames/*.vtu)")
       ->required();
-  deform_app->add_option("--out", options.out, "Output: .npy .pc2 .obj (name.%04d.obj) .pvd")->required();
+  deform_app
+      ->add_option("--out", options.out,
+                   "Output: .npy .pc2 .obj .pvd; name.%04d.obj or name.%04d.npy for one file a frame")
+      ->required();
   deform_app
       ->add_option("--tolerance", options.tolerance,
                    "Length: cells that differ from linear by less are evaluated linearly")

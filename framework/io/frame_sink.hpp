@@ -47,7 +47,8 @@ class FrameSink {
   virtual void finish() = 0;
 };
 
-/// Creates frames of the format of the path's extension: .npy (#frames × #points × #columns; any number of columns),
+/// Creates frames of the format of the path's extension: .npy (#frames × #points × #columns; any number of columns;
+/// `name.%04d.npy` one array a frame),
 /// .pc2, .obj (`name.%04d.obj` for sequences), .pvd (one name_0000.vtp a frame beside it). `shape` gives the faces and,
 /// for OBJ, the text whose "v" lines are replaced; its points are not used. Throws Error on an unknown extension, a
 /// folder that is missing or cannot be written, a full disk, a single file that another process is writing.

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "framework/io/cursor.hpp"
+#include "framework/io/frame_pattern.hpp"
 #include "framework/io/output_file.hpp"
 #include "framework/io/unfinished_run.hpp"
 
@@ -176,11 +177,45 @@ class NpySink final : public FrameSink {
 };
 
 template <class Scalar>
+std::string array_text(const Values<Scalar>& values) {
+  std::string text = npy_header(npy_type<Scalar>(), std::array<std::int64_t, 2>{values.rows(), values.cols()});
+  return text.append(bytes_of(values));
+}
+
+// One array a frame, where the name has a %d.
+class NpySequence final : public FrameSink {
+ public:
+  NpySequence(const std::filesystem::path& path, FramePattern pattern, const FrameSinkOptions& options)
+      : path_(path), pattern_(std::move(pattern)), sequence_(path, options) {}
+
+  void write(const Values<double>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
+  void write(const Values<float>& points, std::span<const PointArray> arrays) override { append(points, arrays); }
+
+  Index num_resumable() const override {
+    return sequence_.num_resumable([&](std::int64_t number) { return file_name(number); });
+  }
+  void resume(Index num_frames) override { sequence_.resume(num_frames); }
+  void finish() override {
+    if (sequence_.num_frames() == 0) raise("{}: no frame was written", path_.string());
+    sequence_.finish();
+  }
+
+ private:
+  template <class Scalar>
+  void append(const Values<Scalar>& points, std::span<const PointArray> arrays) {
+    if (!arrays.empty()) raise("{}: .npy cannot hold the array \"{}\"", path_.string(), arrays.front().name);
+    sequence_.append(file_name(sequence_.number(sequence_.num_frames())), array_text(points));
+  }
+  std::filesystem::path file_name(std::int64_t number) const { return path_.parent_path() / pattern_.name(number); }
+
+  std::filesystem::path path_;
+  FramePattern pattern_;
+  FileSequence sequence_;
+};
+
+template <class Scalar>
 void write_array(const std::filesystem::path& path, const Values<Scalar>& values) {
-  OutputFile file(path);
-  file.write(npy_header(npy_type<Scalar>(), std::array<std::int64_t, 2>{values.rows(), values.cols()}));
-  file.write(bytes_of(values));
-  file.commit();
+  write_text_atomically(path, array_text(values));
 }
 
 }  // namespace
@@ -239,6 +274,8 @@ std::unique_ptr<FrameSource> open_npy_values(const std::filesystem::path& path) 
 
 std::unique_ptr<FrameSink> create_npy_frames(const std::filesystem::path& path, const PointSet&,
                                              const FrameSinkOptions& options) {
+  if (auto pattern = FramePattern::parse(path.filename().string()))
+    return std::make_unique<NpySequence>(path, std::move(*pattern), options);
   return std::make_unique<NpySink>(path, options);
 }
 

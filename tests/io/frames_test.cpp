@@ -142,15 +142,16 @@ TEST_F(Frames, NothingIncompleteAppears) {
   }
   EXPECT_THAT(names(), ElementsAre());
   // Files of a frame are complete one by one; the collection comes when all that it names is there.
-  for (const char* name : {"a.%d.obj", "a.pvd"}) {
+  for (const char* name : {"a.%d.obj", "a.pvd", "b.%d.npy"}) {
     const auto sink = create_frames(file(name));
     for (int f = 0; f < 2; ++f) sink->write(frame_values<float>(f));
   }
-  EXPECT_THAT(names(), ElementsAre("a.0.obj", "a.1.obj", "a_0000.vtp", "a_0001.vtp"));
+  EXPECT_THAT(names(), ElementsAre("a.0.obj", "a.1.obj", "a_0000.vtp", "a_0001.vtp", "b.0.npy", "b.1.npy"));
+  EXPECT_EQ(read_npy(file("b.1.npy")), frame_values<float>(1).cast<double>());
 }
 
 TEST_F(Frames, AnInterruptedRunGoesOn) {
-  for (const char* name : {"a.npy", "a.pc2", "a.%d.obj", "a.pvd"}) {
+  for (const char* name : {"a.npy", "a.pc2", "a.%d.obj", "a.%02d.npy", "a.pvd"}) {
     SCOPED_TRACE(name);
     FrameSinkOptions options{.first = 20, .step = 5, .run = "this run"};
     const auto write = [&](FrameSink& sink, int begin, int end) {
