@@ -48,8 +48,9 @@ Schedule schedule_of(const KrigingOptions& options, int gdim) {
 }
 
 constexpr double accepted_singular_value = 5;
-// E2 beyond which most quadratic modes are missing, as on one or two isolated cells.
-constexpr double missing_modes = 0.75;
+// E2 / √gdim beyond which the squares along every axis are missing: 0.5 on one simplex, 0.42 to 0.44 on the cells of one
+// cube or square, 0.35 and less on strips, bars and slabs, which keep the modes along them.
+constexpr double missing_modes = 0.4;
 // Squared ratio of the longest to the shortest axis of the edge tensor beyond which space is rescaled.
 constexpr double stretched = 16;
 
@@ -85,7 +86,7 @@ class KrigingRow {
     row.diagnostics.schedule_entry = static_cast<std::uint8_t>(best_entry_);
     row.diagnostics.smallest_singular_value = static_cast<float>(best_.smallest_singular_value);
     row.diagnostics.expected_error = static_cast<float>(best_.expected_error);
-    if (best_.quadratic_response > missing_modes) return fall_back(vertex, row);
+    if (best_.quadratic_response > missing_modes * std::sqrt(cells_->gdim())) return fall_back(vertex, row);
     write(row);
     row.diagnostics.rule =
         !accepted ? StencilRule::damped : (best_entry_ == first ? StencilRule::full_fit : StencilRule::wider_patch);
