@@ -89,7 +89,8 @@ TEST(Stress, PassesInShortAndWritesItsReport) {
 
 // The worst case of a property is found again by its own seed alone.
 TEST(Stress, WorstCaseIsRepeatedByItsSeed) {
-  const StressResult many = run_stress({.seed = 5, .num_cases = 10, .minutes = 0, .elements = {"triangle"}, .progress = {}});
+  const StressResult many =
+      run_stress({.seed = 5, .num_cases = 10, .minutes = 0, .elements = {"triangle"}, .progress = {}});
   const StressTally& worst = many.elements[0].tallies[static_cast<std::size_t>(StressProperty::reference)];
   const StressResult one =
       run_stress({.seed = worst.seed, .num_cases = 1, .minutes = 0, .elements = {"triangle"}, .progress = {}});
