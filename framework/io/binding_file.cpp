@@ -256,7 +256,7 @@ Reconstruction read_reconstruction(const TableReader& in, const json& object, co
 
 std::string shown(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
 
-// What bindings consist of: objects of few levels with texts, whole numbers and byte strings. The library's own builder
+// What bindings consist of: objects of few levels with texts, numbers and byte strings. The library's own builder
 // recurses as deep as a file tells it to, and throws on arrays of absurd lengths.
 class BindingBuilder final : public json::json_sax_t {
  public:
@@ -276,7 +276,7 @@ class BindingBuilder final : public json::json_sax_t {
   bool binary(json::binary_t& value) override { return put(std::move(value)); }
   bool number_integer(std::int64_t value) override { return put(value); }
   bool number_unsigned(std::uint64_t value) override { return put(value); }
-  bool number_float(double, const std::string&) override { return false; }
+  bool number_float(double value, const std::string&) override { return put(value); }
   bool null() override { return false; }
   bool boolean(bool) override { return false; }
   bool start_array(std::size_t) override { return false; }
