@@ -74,7 +74,7 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
   const Offset allowed = 20 * static_cast<Offset>(report.num_points) +
                          200 * static_cast<Offset>(report.num_active_cells) + 24 * report.num_stencil_entries;
   fmt::print(
-      "{{\"impl\":\"halfgrad\",\"op\":\"report\",\"n\":{},\"active_cells\":{},\"active_vertices\":{},"
+      "{{\"impl\":\"halfgrad\",\"op\":\"report\",\"seconds\":0,\"n\":{},\"active_cells\":{},\"active_vertices\":{},"
       "\"stencil_entries\":{},\"bytes\":{},\"bytes_allowed\":{},\"peak_of_bind\":{}}}\n",
       report.num_points, report.num_active_cells, report.num_active_vertices, report.num_stencil_entries, report.bytes,
       allowed, peak);

@@ -36,7 +36,7 @@ def gains(program, data, folder, level, out):
         if name == "kriging":
             options = row["options"]
             name += " cubic" if "cubic" in options else " lean" if "lean" in options else " wide"
-        result[name].append(float(row["GAIN"]))
+        result[name].append(float(row["gain_over_linear_all"]))
     return result
 
 

@@ -299,6 +299,7 @@ std::string flatten_cell(Draft& draft, RandomStream& random) {
 
 std::string grade(Draft& draft, RandomStream& random) {
   const double decades = random.uniform(1, 6), size = draft.size();
+  if (!(size > 0)) return "all vertices in one place";
   const Vector center = draft.positions[below(random, draft.positions.size())];
   for (Vector& position : draft.positions) {
     const double distance = (position - center).norm() / size;

@@ -67,7 +67,8 @@ void CaseRunner::check_bad_vertex(std::size_t rule, const Interpolant<Scalar>& i
     bool touched = false;
     for (int i = 0; i < weights.num_nodes; ++i)
       touched |= weights.vertices[i] == bad || reads[weights.vertices[i]] != 0;
-    if (touched || !holds<Scalar>(rule, p)) continue;
+    // Where the type's numbers end is the subject of `finite`.
+    if (touched || !holds<Scalar>(rule, p) || !before.row(p).allFinite()) continue;
     record(StressProperty::bad_vertex, after.row(p) == before.row(p) ? 0 : infinity, place);
   }
 }

@@ -61,7 +61,7 @@ void pack_positions(const Values<Scalar>& values, std::span<const Index> vertice
   parallel_for(count, vertex_grain(count), [&](std::int64_t begin, std::int64_t end) {
     for (std::int64_t v = begin; v < end; ++v) {
       const Scalar* from = values.data() + static_cast<Offset>(vertices[v]) * columns;
-      std::fill(std::copy_n(from, columns, positions + 4 * v), positions + 4 * (v + 1), Scalar(0));
+      for (int c = 0; c < 4; ++c) positions[4 * v + c] = c < columns ? from[c] : Scalar(0);
     }
   });
 }

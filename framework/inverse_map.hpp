@@ -79,6 +79,7 @@ class InverseMap {
 
  private:
   static constexpr double tolerance = 1e-12;
+  static constexpr double hair = 1e-6;  // of the reference cell
 
   Point scaled(const Point& position) const { return (position - origin_).cwiseProduct(scale_); }
   Point image(const Point& xi) const { return nodes_.transpose() * E::shape(xi); }
@@ -105,8 +106,9 @@ class InverseMap {
       highest = std::max(highest, determinant);
       deviation = deviation.max((inverse_ * at_node - Jacobian::Identity()).colwise().norm().transpose().array());
     }
+    distortion_ = deviation.matrix().norm();
     // margin() measures along axes or barycentric directions: a factor of √dim covers both.
-    deviation_ = std::sqrt(E::dim) * deviation.matrix().norm() * radius;
+    deviation_ = std::sqrt(E::dim) * distortion_ * radius;
     one_signed_ = lowest > 0 || highest < 0;
   }
 
@@ -157,12 +159,26 @@ class InverseMap {
     return result;
   }
 
-  // Whether no other start need be tried: ξ is in the cell. For an element whose search is no proof, also where ξ is on
-  // the side of the fold det J = 0 on which the cell lies.
+  // Whether no other start need be tried: ξ is in the cell; or the map is one to one between it and the cell; or ξ is
+  // outside by a hair, on the side of the fold det J = 0 on which the cell lies. For an element whose search is no
+  // proof, the latter holds however far outside.
   bool settles(const InverseMapResult<E>& result) const {
     if (!result.converged) return false;
-    if (E::margin(result.xi) >= 0) return true;
-    return !CubeElement<E> && one_signed_ && scaled_jacobian(result.xi).determinant() * determinant_ > 0;
+    const double margin = E::margin(result.xi);
+    if (margin >= 0 || one_to_one(margin)) return true;
+    if (CubeElement<E> && margin < -hair) return false;
+    return one_signed_ && scaled_jacobian(result.xi).determinant() * determinant_ > 0;
+  }
+
+  // Whether |J_c⁻¹ J − I| < 1, so that the map is one to one, in the reference cell scaled about its center until it
+  // reaches a margin. Scaled by s, the linear and the bilinear part of J − J_c grow by s and s², and neither is greater
+  // than their sum's bound in the cell.
+  bool one_to_one(double margin) const {
+    if constexpr (CubeElement<E> && PolynomialElement<E> && E::dim <= 3) {
+      const double scale = 1 - margin / E::margin(E::center());
+      return (2 * scale * scale - scale) * distortion_ < 1;
+    }
+    return false;
   }
 
   // A part of the cell by its corners, a row each: ξ, and J_c⁻¹ (x(ξ) − X).
@@ -184,10 +200,30 @@ class InverseMap {
     return part;
   }
 
-  // Whether a plane has the images of all corners on one side, and the position on the other.
+  // Whether a plane across an axis has the images of all corners on one side, and the position on the other.
   static bool excludes(const Part& part, double slack) {
-    const auto images = part.template rightCols<E::dim>();
-    return (images.colwise().minCoeff().array() > slack).any() || (images.colwise().maxCoeff().array() < -slack).any();
+    for (int a = 0; a < E::dim; ++a) {
+      double low = part(0, E::dim + a), high = low;
+      for (int c = 1; c < num_corners; ++c) {
+        low = std::min(low, part(c, E::dim + a));
+        high = std::max(high, part(c, E::dim + a));
+      }
+      if (low > slack || high < -slack) return true;
+    }
+    return false;
+  }
+
+  // The same for planes along the part's own mean edges, which fit it the better the smaller it is.
+  static bool excludes_along_edges(const Part& part, double slack) {
+    const Eigen::Matrix<double, num_corners, E::dim> images = part.template rightCols<E::dim>();
+    Jacobian edges = Jacobian::Zero();
+    for (int c = 0; c < num_corners; ++c)
+      for (int a = 0; a < E::dim; ++a)
+        edges.col(a) += (c >> a & 1 ? 2.0 : -2.0) / num_corners * images.row(c).transpose();
+    const Jacobian inverse = edges.inverse();
+    Part own = part;
+    own.template rightCols<E::dim>() = images * inverse.transpose();
+    return own.allFinite() && excludes(own, slack * inverse.cwiseAbs().rowwise().sum().maxCoeff());
   }
 
   // Halves the cell along one axis after the other, iterates from the middles of the parts, and drops parts that cannot
@@ -196,13 +232,16 @@ class InverseMap {
   InverseMapResult<E> search(const Point& target, InverseMapResult<E> best) const {
     constexpr int max_halvings = (CubeElement<E> ? 16 : 3) * E::dim, max_starts = 1000;
     // Beside rounding, what the tolerances of callers let a position be outside.
-    const double slack = 1e-6 + 1e-15 * inverse_.cwiseAbs().rowwise().sum().maxCoeff();
-    std::vector<Part> parts{whole(target)}, halves;
+    const double slack = hair + 1e-15 * inverse_.cwiseAbs().rowwise().sum().maxCoeff();
+    const Part cell = whole(target);
+    if (CubeElement<E> && excludes(cell, slack)) return best;
+    std::vector<Part> parts{cell}, halves;
     int num_starts = 0;
     for (int halving = 0; halving < max_halvings && !parts.empty(); ++halving) {
       const int axis = halving % E::dim;
       for (const Part& part : parts) {
-        if (CubeElement<E> && excludes(part, slack)) continue;
+        if (CubeElement<E> && (excludes(part, slack) || (halving >= E::dim && excludes_along_edges(part, slack))))
+          continue;
         // Most parts are dropped before all axes are halved: an iteration costs more than a halving.
         if (axis == E::dim - 1) {
           const InverseMapResult<E> found =
@@ -228,7 +267,8 @@ class InverseMap {
   double determinant_ = 0;
   bool degenerate_ = false;
   Jacobian inverse_ = Jacobian::Zero();  // at the center, scaled
-  double deviation_ = 0;
+  double distortion_ = 0;                // at least |J_c⁻¹ J − I| in the cell
+  double deviation_ = 0;                 // at least the distance of ξ from the affine guess
   bool affine_ = E::affine;
   bool one_signed_ = true;
 };
