@@ -111,19 +111,6 @@ kernels::PointStage<Scalar> point_stage(const Runs& runs, Eigen::Index columns, 
           .out = out + static_cast<Offset>(runs.base) * columns};
 }
 
-bool is_fast_width(Eigen::Index columns) { return columns >= 1 && columns <= kernels::max_fast_columns; }
-
-// Calls f(begin, end) for each range of consecutive items in [begin, end) that are chosen.
-template <class Chosen, class Function>
-void for_each_chosen_range(Index begin, Index end, Chosen&& chosen, Function&& f) {
-  while (begin < end) {
-    while (begin < end && !chosen(begin)) ++begin;
-    const Index first = begin;
-    while (begin < end && chosen(begin)) ++begin;
-    if (first < begin) f(first, begin);
-  }
-}
-
 // Calls f with a std::integral_constant of the number of columns where it is 1, 2 or 3, else of −1.
 template <class Function>
 void with_columns(Eigen::Index columns, Function&& f) {
@@ -136,6 +123,44 @@ void with_columns(Eigen::Index columns, Function&& f) {
       return f(std::integral_constant<int, 3>());
     default:
       return f(std::integral_constant<int, -1>());
+  }
+}
+
+// Gradients under a blend, #active × (#columns · gdim), from lines where kernels serve the width.
+template <class Binding, class Scalar>
+void blend_gradients(const Binding& binding, const Values<Scalar>& values, Workspace<Scalar>& workspace,
+                     Values<Scalar>& gradients) {
+  const Eigen::Index columns = values.cols();
+  const int gdim = binding.gdim;
+  if (columns > kernels::max_fast_columns || gdim > kernels::max_simplex_dim) {
+    gradients = blended_gradients(*binding.blended, values);
+    return;
+  }
+  Scalar* positions = reserve<Scalar>(workspace.positions, 4 * static_cast<Offset>(binding.vertices.size()));
+  with_columns(columns, [&](auto fixed) {
+    if constexpr (fixed() > 0) pack_positions<fixed()>(values, binding.vertices, positions);
+  });
+  const Offset length = 4 * (1 + gdim);
+  Scalar* lines = reserve<Scalar>(workspace.lines, binding.num_active * length);
+  std::array<Scalar, 9> one;
+  one.fill(1);
+  binding.blend_lines(positions, one, workspace, lines);
+  gradients.resize(binding.num_active, columns * gdim);
+  for (Offset v = 0; v < binding.num_active; ++v)
+    for (Eigen::Index c = 0; c < columns; ++c)
+      for (int k = 0; k < gdim; ++k) gradients(v, c * gdim + k) = lines[v * length + 4 * (1 + k) + c];
+}
+
+bool is_fast_width(Eigen::Index columns) { return columns >= 1 && columns <= kernels::max_fast_columns; }
+
+// Calls f(begin, end) for each range of consecutive items in [begin, end) that are chosen.
+template <class Chosen, class Function>
+void for_each_chosen_range(Index begin, Index end, Chosen&& chosen, Function&& f) {
+  while (begin < end) {
+    while (begin < end && !chosen(begin)) ++begin;
+    const Index first = begin;
+    while (begin < end && chosen(begin)) ++begin;
+    if (first < begin) f(first, begin);
   }
 }
 
@@ -273,8 +298,10 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
 
   // Gradients for the plain path.
   if (rule.needs_gradients() && gradients == nullptr && any_plain) {
-    if (blended)
+    if (blended && options.kernel == Kernel::plain)
       workspace.gradients = blended_gradients(*blended, values);
+    else if (blended)
+      blend_gradients(*this, values, workspace, workspace.gradients);
     else
       plain_vertex_stage(values, 0, gdim, workspace.gradients);
     if (rule.needs_hessians()) workspace.hessians = vertex_hessians(values);
@@ -539,8 +566,12 @@ template <class Scalar>
 Values<Scalar> Interpolant<Scalar>::vertex_gradients(const Values<Scalar>& values) const {
   binding_->require_values(values);
   binding_->require_gradients();
-  if (binding_->blended) return blended_gradients(*binding_->blended, values);
   Values<Scalar> gradients;
+  if (binding_->blended) {
+    Workspace<Scalar> workspace;
+    blend_gradients(*binding_, values, workspace, gradients);
+    return gradients;
+  }
   binding_->plain_vertex_stage(values, 0, binding_->gdim, gradients);
   return gradients;
 }
