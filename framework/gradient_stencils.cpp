@@ -104,6 +104,19 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
   return result;
 }
 
+void append_row(const GradientStencilTable& from, Index row, GradientStencilTable& to) {
+  const Offset begin = from.offsets[row], end = from.offsets[row + 1];
+  const auto append = [&](const auto& source, auto& target, int width) {
+    target.insert(target.end(), source.begin() + begin * width, source.begin() + end * width);
+  };
+  to.vertices.push_back(from.vertices[row]);
+  append(from.neighbors, to.neighbors, 1);
+  append(from.weights, to.weights, from.gdim);
+  if (from.has_hessians()) append(from.hessian_weights, to.hessian_weights, num_symmetric(from.gdim));
+  if (!from.diagnostics.empty()) to.diagnostics.push_back(from.diagnostics[row]);
+  to.offsets.push_back(to.num_entries());
+}
+
 Reconstruction select_rows(const Reconstruction& reconstruction, std::span<const Index> vertices) {
   const GradientStencilTable& from = reconstruction.stencils;
   if (reconstruction.blend) {
@@ -117,22 +130,10 @@ Reconstruction select_rows(const Reconstruction& reconstruction, std::span<const
   for (Index r = 0; r < from.num_rows(); ++r) row_of[from.vertices[r]] = r;
 
   Reconstruction result;
-  GradientStencilTable& to = result.stencils;
-  to.gdim = from.gdim;
-  to.vertices.assign(vertices.begin(), vertices.end());
-  const int symmetric = num_symmetric(from.gdim);
+  result.stencils.gdim = from.gdim;
   for (Index v : vertices) {
     if (v > largest || row_of[v] < 0) raise("no gradient stencil for vertex {}: reconstruct every active vertex", v);
-    const Index r = row_of[v];
-    const Offset begin = from.offsets[r], end = from.offsets[r + 1];
-    to.neighbors.insert(to.neighbors.end(), from.neighbors.begin() + begin, from.neighbors.begin() + end);
-    to.weights.insert(to.weights.end(), from.weights.begin() + begin * from.gdim,
-                      from.weights.begin() + end * from.gdim);
-    if (from.has_hessians())
-      to.hessian_weights.insert(to.hessian_weights.end(), from.hessian_weights.begin() + begin * symmetric,
-                                from.hessian_weights.begin() + end * symmetric);
-    if (!from.diagnostics.empty()) to.diagnostics.push_back(from.diagnostics[r]);
-    to.offsets.push_back(to.num_entries());
+    append_row(from, row_of[v], result.stencils);
   }
   return result;
 }

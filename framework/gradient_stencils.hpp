@@ -95,6 +95,9 @@ Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const V
 template <class Scalar>
 Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Values<Scalar>& values);
 
+/// Appends a row of `from`, with its vertex and what is told of it, to a table of the same kind.
+void append_row(const GradientStencilTable& from, Index row, GradientStencilTable& to);
+
 /// The rows of `vertices`, in that order. A reconstruction with a blend must already have exactly these. Throws Error
 /// where a vertex has no row.
 Reconstruction select_rows(const Reconstruction& reconstruction, std::span<const Index> vertices);

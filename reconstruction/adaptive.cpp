@@ -20,6 +20,19 @@ void find_neighbors(const CellGradients& cells, Index vertex, std::vector<Index>
   neighbors.erase(std::unique(neighbors.begin(), neighbors.end()), neighbors.end());
 }
 
+bool is_determined(const StencilDiagnostics& row) {
+  return row.rule == StencilRule::full_fit || row.rule == StencilRule::wider_patch;
+}
+
+// Whether a gradient is one to test others with: rows of no usable cell are zero, and damped ones beside slivers may be
+// of any size. The bound is that of accepted patches (docs/kriging.md).
+bool is_sound(const StencilDiagnostics& row) { return row.rule != StencilRule::none && row.absolute_sum <= 20; }
+
+// Whether a neighbour's gradient says something of a vertex's: one that is worse determined does not.
+bool tells_of(const StencilDiagnostics& neighbor, const StencilDiagnostics& own) {
+  return is_sound(own) && is_sound(neighbor) && (is_determined(neighbor) || !is_determined(own));
+}
+
 }  // namespace
 
 Reconstruction Adaptive::reconstruct(const CellGradients& cells, std::span<const Index> vertices) const {
@@ -28,25 +41,41 @@ Reconstruction Adaptive::reconstruct(const CellGradients& cells, std::span<const
   std::vector<Index> rows(vertices.begin(), vertices.end()), row_of(cells.num_vertices(), unseen), neighbors;
   for (std::size_t r = 0; r < vertices.size(); ++r) row_of[vertices[r]] = static_cast<Index>(r);
 
-  AdaptiveBlend blend;
-  blend.prediction_share = 0.25;
+  // Every pair of neighbours, then those whose gradients tell of each other.
+  std::vector<Offset> first_pair{0};
+  std::vector<Index> pairs;
   for (Index vertex : vertices) {
     find_neighbors(cells, vertex, neighbors);
     for (Index v : neighbors) {
-      const Vector edge = (cells.vertices().row(v) - cells.vertices().row(vertex)).transpose();
-      if (!(edge.squaredNorm() > 0)) continue;
       if (row_of[v] == unseen) {
         row_of[v] = static_cast<Index>(rows.size());
         rows.push_back(v);
       }
-      blend.edge_rows.push_back(row_of[v]);
+      pairs.push_back(row_of[v]);
+    }
+    first_pair.push_back(static_cast<Offset>(pairs.size()));
+  }
+  const GradientStencilTable lean = Kriging({.patch = KrigingPatch::lean}).reconstruct(cells, rows).stencils;
+  Reconstruction result = Kriging().reconstruct(cells, vertices);
+
+  AdaptiveBlend blend;
+  blend.prediction_share = 0.25;
+  blend.averaging = ChandrashekarGarg().reconstruct(cells, vertices).stencils;
+  blend.probing.gdim = gdim;
+  for (Index r = 0; r < lean.num_rows(); ++r) {
+    const bool own = static_cast<std::size_t>(r) < vertices.size();
+    append_row(own && !is_sound(lean.diagnostics[r]) ? result.stencils : lean, r, blend.probing);
+  }
+  for (std::size_t r = 0; r < vertices.size(); ++r) {
+    for (Offset pair = first_pair[r]; pair < first_pair[r + 1]; ++pair) {
+      const Index other = pairs[pair];
+      const Vector edge = (cells.vertices().row(rows[other]) - cells.vertices().row(vertices[r])).transpose();
+      if (!(edge.squaredNorm() > 0) || !tells_of(lean.diagnostics[other], lean.diagnostics[r])) continue;
+      blend.edge_rows.push_back(other);
       blend.edges.insert(blend.edges.end(), edge.data(), edge.data() + gdim);
     }
     blend.edge_offsets.push_back(static_cast<Offset>(blend.edge_rows.size()));
   }
-  blend.probing = Kriging({.patch = KrigingPatch::lean}).reconstruct(cells, rows).stencils;
-  blend.averaging = ChandrashekarGarg().reconstruct(cells, vertices).stencils;
-  Reconstruction result = Kriging().reconstruct(cells, vertices);
   result.blend = std::move(blend);
   return result;
 }

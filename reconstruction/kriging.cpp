@@ -48,8 +48,8 @@ Schedule schedule_of(const KrigingOptions& options, int gdim) {
 }
 
 constexpr double accepted_singular_value = 5;
-// E2 / √gdim beyond which the squares along every axis are missing: 0.5 on one simplex, 0.42 to 0.44 on the cells of one
-// cube or square, 0.35 and less on strips, bars and slabs, which keep the modes along them.
+// E2 / √gdim beyond which the squares along every axis are missing: 0.5 on one simplex, 0.42 to 0.44 on the cells of
+// one cube or square, 0.35 and less on strips, bars and slabs, which keep the modes along them.
 constexpr double missing_modes = 0.4;
 // Squared ratio of the longest to the shortest axis of the edge tensor beyond which space is rescaled.
 constexpr double stretched = 16;
@@ -66,6 +66,9 @@ class KrigingRow {
 
   void operator()(Index vertex, StencilRow& row) {
     row.diagnostics.rule = StencilRule::none;
+    // Cells without volume hold no points, and what a flat patch makes of the direction across it is rounding.
+    const auto has_volume = [&](Index cell) { return cells_->gradient(cell).volume > 0; };
+    if (std::ranges::none_of(cells_->cells_of(vertex), has_volume)) return;
     rings_.start(vertex);
     if (!find_metric(vertex)) return;
     const std::size_t last = schedule_.size() - 1;
@@ -155,7 +158,6 @@ class KrigingRow {
 
   // The volume-weighted mean of the gradients of the cells within two rings. Where modes are missing these are as a
   // rule all cells of a part of the mesh: its vertices then agree, and no curvature is made up that no value tells.
-  // No row where no cell is usable: what a flat patch makes of the direction across it is rounding.
   void fall_back(Index vertex, StencilRow& row) {
     std::vector<Index> cells(cells_->cells_of(vertex).begin(), cells_->cells_of(vertex).end());
     for (Index v : rings_.within(2)) cells.insert(cells.end(), cells_->cells_of(v).begin(), cells_->cells_of(v).end());
@@ -164,7 +166,6 @@ class KrigingRow {
     std::vector<double> weights;
     for (Index cell : cells) weights.push_back(cells_->gradient(cell).volume);
     const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
-    if (!(sum > 0)) return;
     for (double& weight : weights) weight /= sum;
     compose_row(*cells_, vertex, cells, weights, row);
     const Eigen::Index gdim = cells_->gdim(), count = static_cast<Eigen::Index>(row.neighbors.size());

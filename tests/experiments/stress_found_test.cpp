@@ -111,7 +111,7 @@ TEST(StressFound, PointsAtACollapsedCornerStayThere) {
   Points points(1, 2);
   points << 1 + 1e-10, 1 + 1e-10;
   const Embedding embedding = embed(mesh, points);
-  ASSERT_EQ(embedding.status[0], PointStatus::boundary);
+  ASSERT_TRUE(embedding.outside.empty());
   const Eigen::RowVector2d found =
       Quadrilateral::shape(embedding.local.row(0).transpose()).transpose() * vertices.leftCols<2>();
   EXPECT_LT((found - points.row(0)).norm(), 1e-9);
