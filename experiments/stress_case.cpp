@@ -132,22 +132,29 @@ void CaseRunner::check_located() {
 }
 
 // What the gradients of a blend are computed from: those of the averages and kriging at the vertex and at its
-// neighbours, taken by differences along edges whose damped inverse is at most ten times the dimension over their
-// number.
+// neighbours, and difference quotients along the edges, taken together by a damped inverse that is at most ten times
+// the dimension over their number.
 void CaseRunner::bound_blend(Rows& rows) const {
-  const double factor = 10 * mesh_.gdim();
-  for (ReferenceGradients Rows::*set : {&Rows::noise, &Rows::affine}) {
+  const int gdim = mesh_.gdim();
+  const double factor = 10 * gdim;
+  const auto bound = [&](ReferenceGradients Rows::*set, const ReferenceValues& values) {
     ReferenceGradients& gradients = rows.*set;
     for (Index v = 0; v < mesh_.num_vertices(); ++v)
       for (std::size_t k = 0; k < gradients.gradient[v].size(); ++k) {
         long double most = 0;
         for (const Index cell : cells_->cells_of(v))
-          for (const Index neighbor : cells_->vertices_of(cell))
+          for (const Index neighbor : cells_->vertices_of(cell)) {
             for (const Rows& other : rows_)
               if (other.made->blended_in) most = std::max(most, (other.*set).gradient[neighbor][k].magnitude);
+            const double length = (mesh_.vertices().row(neighbor) - mesh_.vertices().row(v)).norm();
+            if (length > 0)
+              most = std::max(most, 2 * difference(values, neighbor, v, static_cast<int>(k) / gdim).magnitude / length);
+          }
         gradients.gradient[v][k].magnitude = factor * most;
       }
-  }
+  };
+  bound(&Rows::noise, noise_);
+  bound(&Rows::affine, affine_);
 }
 
 Rows CaseRunner::make_rows(const StressReconstructor& made) {

@@ -74,6 +74,8 @@ ReferenceCoefficients coefficients_in(const InterpolationRule& rule, const Refer
   return result;
 }
 
+}  // namespace
+
 Measured difference(const ReferenceValues& values, Index vertex, Index from, int column) {
   const long double x = values.values(vertex, column), origin = values.values(from, column);
   Measured result(x - origin);
@@ -81,8 +83,6 @@ Measured difference(const ReferenceValues& values, Index vertex, Index from, int
     result.magnitude += static_cast<long double>(values.rounding[vertex]) + values.rounding[from];
   return result;
 }
-
-}  // namespace
 
 ReferenceWeights reference_weights(const Mesh& mesh, const Embedding& embedding, Index point,
                                    const OutsidePoint* outside) {

@@ -63,6 +63,9 @@ struct ReferenceValues {
   std::vector<double> rounding;  ///< empty where the values are exact
 };
 
+/// The value of `vertex` less that of `from`.
+Measured difference(const ReferenceValues& values, Index vertex, Index from, int column);
+
 /// F (and Q) of each vertex that a table has a row for, [vertex][column · gdim + axis], empty for others.
 struct ReferenceGradients {
   std::vector<std::vector<Measured>> gradient, hessian;

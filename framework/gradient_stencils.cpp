@@ -73,7 +73,7 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
       load(fitted, r, fit);
       load(probing, r, probe);
       // Mismatches m of the probing gradient: their squares and Σ m êᵀ tell those of every other gradient.
-      double squares = 0;
+      double squares = 0, quotients = 0;
       moment = Eigen::MatrixXd::Zero(columns, gdim);
       for (Offset e = blend.edge_offsets[r]; e < blend.edge_offsets[r + 1]; ++e) {
         const Index other = blend.edge_rows[e];
@@ -82,6 +82,7 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
         mismatch = (2 / length) * (values.row(blend.probing.vertices[other]) - values.row(table.vertices[r]))
                                       .transpose()
                                       .template cast<double>();
+        quotients += mismatch.squaredNorm();
         const Eigen::Map<const Values<Scalar>> neighbor(probing.data() + other * columns * gdim, columns, gdim);
         mismatch -= (probe + neighbor.template cast<double>()) * (edge / length);
         squares += mismatch.squaredNorm();
@@ -94,8 +95,9 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
       };
       const Eigen::MatrixXd prediction = moment * metric.damped_inverse;
       const double common = 2 * squares + added(prediction);
-      const double weight =
-          fitted_weight(std::max(0.0, common + added(fit - probe) / 2), std::max(0.0, common + added(average - probe)));
+      const auto weight = static_cast<double>(fitted_weight(
+          static_cast<Scalar>(std::max(0.0, common + added(fit - probe) / 2)),
+          static_cast<Scalar>(std::max(0.0, common + added(average - probe))), static_cast<Scalar>(quotients)));
       fit += blend.prediction_share * (probe + prediction - fit);
       Eigen::Map<Values<Scalar>>(result.data() + r * columns * gdim, columns, gdim) =
           (average + weight * (fit - average)).template cast<Scalar>();

@@ -1,6 +1,7 @@
 // Vertex gradients as weights on vertex values: what every reconstructor ends in.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -63,11 +64,14 @@ struct EdgeMetric {
 };
 EdgeMetric edge_metric(const AdaptiveBlend& blend, Index row, int gdim);
 
-/// The weight of the fitted gradient by the mismatches of the fitted and of the averaged one: 1 / (1 + 2 q⁶) of their
-/// ratio. Two gradients without mismatch agree: either serves.
+/// The weight of the fitted gradient by the mismatches of the fitted and of the averaged one, 1 / (1 + 2 q⁶) of their
+/// ratio. `squares` are those of what mismatches are differences of: below (1000 ε)² of them both are rounding, as
+/// where the edges do not see that the gradients differ, and the fitted one is taken.
 template <class Scalar>
-Scalar fitted_weight(Scalar fitted, Scalar averaged) {
-  const Scalar ratio = fitted > 0 ? fitted / averaged : 0, cubed = ratio * ratio * ratio;
+Scalar fitted_weight(Scalar fitted, Scalar averaged, Scalar squares) {
+  constexpr Scalar rounding = 1000 * std::numeric_limits<Scalar>::epsilon();
+  const Scalar ratio = fitted > 0 ? fitted / (averaged + rounding * rounding * squares) : 0;
+  const Scalar cubed = ratio * ratio * ratio;
   return 1 / (1 + 2 * cubed * cubed);
 }
 
@@ -91,7 +95,7 @@ Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const V
 ///   E(F) = Σ over edges e of |2 (x_j − x_v) − (F + L_j) e|² / |e|²,
 /// P = L_v + Σ m êᵀ · damped_inverse (m the mismatches of L_v) is the neighbours' prediction, and
 ///   F = F_c + w (F_s − F_c),  F_s = F_k + share (P − F_k),
-///   w = fitted_weight((E(L) + E(F_k)) / 2 + E(P), E(F_c) + E(P)).
+///   w = fitted_weight((E(L) + E(F_k)) / 2 + E(P), E(F_c) + E(P), Σ |2 (x_j − x_v)|² / |e|²).
 template <class Scalar>
 Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Values<Scalar>& values);
 

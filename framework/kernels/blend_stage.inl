@@ -43,7 +43,7 @@ void blend_lines(const BlendStage<T>& stage, Index begin, Index end) {
   for (Index row = begin; row < end; ++row) {
     const T* const own = stage.probing + static_cast<Offset>(row) * length;
     const F position = F::load(own);
-    F probe[d], moment[d], squares = F::zero();
+    F probe[d], moment[d], squares = F::zero(), quotients = F::zero();
     HALFGRAD_UNROLL
     for (int a = 0; a < d; ++a) {
       probe[a] = F::load(own + 4 * (1 + a));
@@ -53,6 +53,7 @@ void blend_lines(const BlendStage<T>& stage, Index begin, Index end) {
       const T* const other = stage.probing + static_cast<Offset>(stage.edge_rows[e]) * length;
       const T* const edge = stage.edges + e * (1 + d);
       F mismatch = (F::load(other) - position) * edge[0];
+      quotients = plus_product(quotients, mismatch, mismatch);
       HALFGRAD_UNROLL
       for (int a = 0; a < d; ++a) mismatch = mismatch.minus(probe[a] + F::load(other + 4 * (1 + a)), edge[1 + a]);
       HALFGRAD_UNROLL
@@ -79,8 +80,8 @@ void blend_lines(const BlendStage<T>& stage, Index begin, Index end) {
       return sum;
     };
     const F common = squares * T(2) + added(prediction);
-    const T weight =
-        fitted_weight(nonnegative_sum(common.plus(added(of_fit), T(0.5))), nonnegative_sum(common + added(of_average)));
+    const T weight = fitted_weight(nonnegative_sum(common.plus(added(of_fit), T(0.5))),
+                                   nonnegative_sum(common + added(of_average)), nonnegative_sum(quotients));
     position.store(line);
     HALFGRAD_UNROLL
     for (int a = 0; a < d; ++a) {
