@@ -36,7 +36,7 @@ StressReconstructor made(const json& specification) {
     result.residual_condition = result.forward_condition = 1e3;
   }
   result.grids_only = from.name == "centered_difference";
-  result.blended_in = from.name == "chandrashekar_garg" || from.name == "kriging";
+  result.blended_in = result.name == "chandrashekar_garg" || result.name == "kriging" || result.name == "kriging lean";
   result.is_mean =
       from.name == "unweighted_average" || from.name == "volume_average" || from.name == "inverse_distance";
   return result;
