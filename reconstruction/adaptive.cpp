@@ -20,18 +20,9 @@ void find_neighbors(const CellGradients& cells, Index vertex, std::vector<Index>
   neighbors.erase(std::unique(neighbors.begin(), neighbors.end()), neighbors.end());
 }
 
-bool is_determined(const StencilDiagnostics& row) {
-  return row.rule == StencilRule::full_fit || row.rule == StencilRule::wider_patch;
-}
-
 // Whether a gradient is one to test others with: rows of no usable cell are zero, and damped ones beside slivers may be
-// of any size. The bound is that of accepted patches (docs/kriging.md).
-bool is_sound(const StencilDiagnostics& row) { return row.rule != StencilRule::none && row.absolute_sum <= 20; }
-
-// Whether a neighbour's gradient says something of a vertex's: one that is worse determined does not.
-bool tells_of(const StencilDiagnostics& neighbor, const StencilDiagnostics& own) {
-  return is_sound(own) && is_sound(neighbor) && (is_determined(neighbor) || !is_determined(own));
-}
+// of any size. Rows above twenty, the bound of accepted patches, still serve (docs/adaptive.md).
+bool is_sound(const StencilDiagnostics& row) { return row.rule != StencilRule::none && row.absolute_sum <= 1000; }
 
 }  // namespace
 
@@ -41,7 +32,7 @@ Reconstruction Adaptive::reconstruct(const CellGradients& cells, std::span<const
   std::vector<Index> rows(vertices.begin(), vertices.end()), row_of(cells.num_vertices(), unseen), neighbors;
   for (std::size_t r = 0; r < vertices.size(); ++r) row_of[vertices[r]] = static_cast<Index>(r);
 
-  // Every pair of neighbours, then those whose gradients tell of each other.
+  // Every pair of neighbours, then those of sound gradients.
   std::vector<Offset> first_pair{0};
   std::vector<Index> pairs;
   for (Index vertex : vertices) {
@@ -70,7 +61,7 @@ Reconstruction Adaptive::reconstruct(const CellGradients& cells, std::span<const
     for (Offset pair = first_pair[r]; pair < first_pair[r + 1]; ++pair) {
       const Index other = pairs[pair];
       const Vector edge = (cells.vertices().row(rows[other]) - cells.vertices().row(vertices[r])).transpose();
-      if (!(edge.squaredNorm() > 0) || !tells_of(lean.diagnostics[other], lean.diagnostics[r])) continue;
+      if (!(edge.squaredNorm() > 0) || !is_sound(lean.diagnostics[other]) || !is_sound(lean.diagnostics[r])) continue;
       blend.edge_rows.push_back(other);
       blend.edges.insert(blend.edges.end(), edge.data(), edge.data() + gdim);
     }

@@ -105,7 +105,8 @@ TEST_F(Program, UsageErrorsExitWith2) {
 
 TEST_F(Program, UsageErrorsSayWhatToTypeNext) {
   EXPECT_THAT(run_program("dfeorm").output, AllOf(HasSubstr("did you mean deform?"), HasSubstr("halfgrad --help")));
-  EXPECT_THAT(run_program("dance").output, AllOf(HasSubstr("dance"), HasSubstr("deform, bind, report, stress, export")));
+  EXPECT_THAT(run_program("dance").output,
+              AllOf(HasSubstr("dance"), HasSubstr("deform, bind, report, stress, export")));
   EXPECT_THAT(deform("--intepolant linear").output,
               AllOf(HasSubstr("did you mean --interpolant?"), HasSubstr("halfgrad deform --help")));
   EXPECT_THAT(run_program("--outside nearest").output,
