@@ -22,9 +22,10 @@ struct EdgeWindows {
   }
 };
 
-/// `nodes` are the vertices of each run, `rest` their positions relative to the first.
-template <int dim, class Scalar, class Nodes, class Rest>
-EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Rest& rest) {
+/// `nodes` are the vertices of each run; `edge(run, i, j)` is X_j − X_i in double: differences of positions in float
+/// would keep no digits of a short edge.
+template <int dim, class Scalar, class Nodes, class Edge>
+EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Edge& edge) {
   constexpr int num_edges = kernels::num_edges(dim);
   // Open addressing; a slot of an earlier window counts as empty. Twice the edges that a window can have, or more.
   struct Slot {
@@ -54,7 +55,8 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Rest& rest) {
         if (slots[at].edge < window_begin) {
           slots[at] = {ends, static_cast<Index>(result.ends.size())};
           result.ends.push_back({nodes[run][i], nodes[run][j]});
-          for (int k = 0; k < dim; ++k) result.vectors.push_back(rest[run][j][k] - rest[run][i][k]);
+          const Vector vector = edge(run, i, j);
+          for (int k = 0; k < dim; ++k) result.vectors.push_back(static_cast<Scalar>(vector[k]));
         }
         result.of_run.push_back(static_cast<std::uint16_t>(slots[at].edge - window_begin));
         if (result.ends[slots[at].edge][0] != nodes[run][i])

@@ -387,7 +387,10 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
                             binding->permutation.data() + base);
     if constexpr (E::affine)
       if (rule.needs_gradients() && !rule.needs_hessians())
-        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, runs.rest);
+        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run, int i, int j) -> Vector {
+          const std::span<const Index> vertices = mesh.cell_vertices(order.cells[members[run]]);
+          return (mesh.vertices().row(vertices[j]) - mesh.vertices().row(vertices[i])).transpose();
+        });
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));
   });

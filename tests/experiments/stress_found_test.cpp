@@ -131,6 +131,23 @@ TEST(StressFound, VerticesWithoutVolumeHaveNoGradient) {
   }
 }
 
+// A short edge away from the first node had the digits of a difference in float. On one cell hermite is linear.
+TEST(StressFound, ShortEdgesKeepTheirDigitsInFloat) {
+  Points vertices(3, 2);
+  vertices << 0, 0, 1, 0.3, 1, 0.3 + 5e-8;
+  const Mesh mesh = triangles(vertices, {{0, 1, 2}});
+  Points points(1, 2);
+  points << 0.25 * vertices.row(1) + 0.75 * vertices.row(2);
+  const Embedding embedding = embed(mesh, points);
+  const Reconstruction rows = make_reconstructor("chandrashekar_garg")
+                                  .reconstructor->reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+  Values<float> values(3, 2);
+  values << 0, 0, 1, -1, -1, 1;
+  const Values<float> linear = Interpolant<float>(mesh, embedding, named_rule("linear"), nullptr).evaluate(values);
+  const Values<float> hermite = Interpolant<float>(mesh, embedding, named_rule("hermite"), &rows).evaluate(values);
+  EXPECT_LT((hermite - linear).cwiseAbs().maxCoeff(), 1e-5f);
+}
+
 // Near points and others 1e5 times as far: the quadratic and cubic modes, of 1e10 and 1e15, left 1e-7 in the linear
 // ones, and Hessians of affine values.
 TEST(StressFound, FitsOverUnequalDistancesKeepAffineValues) {
