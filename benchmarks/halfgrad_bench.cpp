@@ -1,6 +1,7 @@
-// halfgrad_bench WORKLOAD ROUNDS MAX_POINTS [THREADS]: times frames, location and bind on one workload, one JSON line
-// each. Every round runs each operation once in turn, so that all see the same load of the machine; a frame is repeated
-// within its turn and the fastest repetition counts. Compare numbers of one round only.
+// halfgrad_bench WORKLOAD ROUNDS MAX_POINTS [THREADS [OP,OP,...]]: times frames, location and bind on one workload, one
+// JSON line each; the named operations alone where there are some. Every round runs each operation once in turn, so
+// that all see the same load of the machine; a frame is repeated within its turn and the fastest repetition counts.
+// Compare numbers of one round only.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
@@ -75,7 +76,8 @@ std::int64_t peak_bytes() {
   return 0;
 }
 
-void run(const std::string& name, int rounds, std::int64_t max_points, int threads) {
+// `only` names operations between commas; all where it is empty.
+void run(const std::string& name, int rounds, std::int64_t max_points, int threads, const std::string& only) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   const bool is_lattice = !name.ends_with(".bin");
   const Workload workload = is_lattice ? lattice_workload(name, max_points) : read_workload(name, max_points);
@@ -174,12 +176,17 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
     operations.push_back({"scalar_linear", frames, [&] { scalar_linear->evaluate(values.data(), copied.data()); }});
     operations.push_back({"paper_style", 1, [&] { paper_style->evaluate(values.data(), copied.data()); }});
   }
+  if (!only.empty())
+    std::erase_if(operations, [&](const Operation& operation) {
+      return ("," + only + ",").find(fmt::format(",{},", operation.name)) == std::string::npos;
+    });
   // A first pass over everything touches all memory, and shows that the contestants agree.
   for (const Operation& operation : operations) operation.run();
   Values<float> reference = phong.interpolant.evaluate(values, {.kernel = Kernel::plain});
   if (all_tetrahedra) {
     paper_style->evaluate(values.data(), reference.data());
   }
+  phong_user.user_order(values);
   const float difference = (reference - phong_user.out).cwiseAbs().maxCoeff();
   fmt::print(
       "{{\"impl\":\"halfgrad\",\"op\":\"report\",\"n\":{},\"active_cells\":{},\"active_vertices\":{},"
@@ -200,12 +207,13 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
 }  // namespace halfgrad::benchmarks
 
 int main(int argc, char** argv) {
-  if (argc < 4 || argc > 5) {
-    fmt::print(stderr, "usage: halfgrad_bench WORKLOAD.bin|ELEMENT:CELLS ROUNDS MAX_POINTS [THREADS]\n");
+  if (argc < 4 || argc > 6) {
+    fmt::print(stderr, "usage: halfgrad_bench WORKLOAD.bin|ELEMENT:CELLS ROUNDS MAX_POINTS [THREADS [OP,OP,...]]\n");
     return 2;
   }
   try {
-    halfgrad::benchmarks::run(argv[1], std::atoi(argv[2]), std::atoll(argv[3]), argc == 5 ? std::atoi(argv[4]) : 1);
+    halfgrad::benchmarks::run(argv[1], std::atoi(argv[2]), std::atoll(argv[3]), argc >= 5 ? std::atoi(argv[4]) : 1,
+                              argc == 6 ? argv[5] : "");
   } catch (const halfgrad::Error& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 2;

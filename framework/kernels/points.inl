@@ -116,23 +116,23 @@ constexpr bool has_power() {
   return Monomials::place(exponents) >= 0;
 }
 
-template <class Monomials, int k, int power, int... before, class T, class W>
-HWY_INLINE W horner_from(const T* c, const W* xi);
+template <class Monomials, int k, int power, int... before, class W>
+HWY_INLINE W horner_from(const W* c, const W* xi);
 
 // The factor of ξ_0^before_0 ξ_1^before_1 …: a polynomial in ξ_k, ξ_(k+1) ….
-template <class Monomials, int k, int... before, class T, class W>
-HWY_INLINE W horner(const T* c, const W* xi) {
+template <class Monomials, int k, int... before, class W>
+HWY_INLINE W horner(const W* c, const W* xi) {
   if constexpr (k == Monomials::dim) {
     constexpr int place = Monomials::place({before...});
-    return W::load(c + Spread<T, Monomials::dim>::size * place);
+    return c[place];
   } else {
     return horner_from<Monomials, k, 0, before...>(c, xi);
   }
 }
 
 // Σ_{e ≥ power} ξ_k^(e − power) · (factor of ξ_k^e)
-template <class Monomials, int k, int power, int... before, class T, class W>
-HWY_INLINE W horner_from(const T* c, const W* xi) {
+template <class Monomials, int k, int power, int... before, class W>
+HWY_INLINE W horner_from(const W* c, const W* xi) {
   const W lowest = horner<Monomials, k + 1, before..., power>(c, xi);
   if constexpr (has_power<Monomials, k, power + 1, before...>())
     return lowest.plus(xi[k], horner_from<Monomials, k, power + 1, before...>(c, xi));
@@ -166,9 +166,14 @@ HWY_INLINE void evaluate_points(const PointStage<T>& stage, const Spread<T, d>& 
 template <class Monomials, class T>
 HWY_INLINE void evaluate_polynomials(const PointStage<T>& stage, const Spread<T, Monomials::dim>& spread, Index begin,
                                      Index end, const T* coefficients, int stride, Index num_whole) {
-  for (Index run = begin; run < end; ++run, coefficients += stride)
+  for (Index run = begin; run < end; ++run, coefficients += stride) {
+    // Loaded before the points, whose stores may be to any memory for all that the compiler knows.
+    Wide<T> c[Monomials::size];
+    HALFGRAD_UNROLL
+    for (int i = 0; i < Monomials::size; ++i) c[i] = Wide<T>::load(coefficients + Spread<T, Monomials::dim>::size * i);
     evaluate_points<Monomials::dim>(stage, spread, run, num_whole,
-                                    [&](const Wide<T>* xi) HWY_ATTR { return horner<Monomials, 0>(coefficients, xi); });
+                                    [&](const Wide<T>* xi) HWY_ATTR { return horner<Monomials, 0>(c, xi); });
+  }
 }
 
 // ---- runs

@@ -15,20 +15,20 @@ HWY_BEFORE_NAMESPACE();
 namespace halfgrad::kernels::HWY_NAMESPACE {
 
 // sum + Σ_i B_mi items[i · stride]
-template <class E, int m, class Item, std::size_t... i>
+template <class E, int m, int stride, class Item, std::size_t... i>
 HWY_INLINE Item combination(const Item* items, Item sum, std::index_sequence<i...>) {
   const auto add = [&]<std::size_t node>() HWY_ATTR {
     constexpr int factor = E::shape_coefficients[m][node];
-    if constexpr (factor == 1) sum = sum + items[node];
-    if constexpr (factor == -1) sum = sum - items[node];
+    if constexpr (factor == 1) sum = sum + items[node * stride];
+    if constexpr (factor == -1) sum = sum - items[node * stride];
     static_assert(factor >= -1 && factor <= 1);
   };
   (add.template operator()<i>(), ...);
   return sum;
 }
-template <class E, int m, class Item>
+template <class E, int m, int stride = 1, class Item>
 HWY_INLINE Item combination(const Item* items, Item zero) {
-  return combination<E, m>(items, zero, std::make_index_sequence<E::num_nodes>());
+  return combination<E, m, stride>(items, zero, std::make_index_sequence<E::num_nodes>());
 }
 
 // Calls f with std::integral_constant 0 … count − 1.
@@ -56,7 +56,7 @@ HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* li
   using F = Four<T>;
   using M = ProductMonomials<E, factor>;
   constexpr int n = E::num_nodes, d = E::dim;
-  F moved[n], h[d][n], sum[M::size];
+  F moved[n], h[d][n];
   HALFGRAD_UNROLL
   for (int i = 0; i < n; ++i) {
     moved[i] = F::load(line[i]);
@@ -66,31 +66,30 @@ HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* li
       moved[i] = moved[i].minus(h[a][i], rest[i * d + a]);
     }
   }
+  // Y of the monomial 1 is zero.
   T y[M::num_shape][d];
-  for (int a = 0; a < d; ++a) {
-    T along[n];
-    for (int i = 0; i < n; ++i) along[i] = rest[i * d + a];
-    unrolled<M::num_shape>([&](auto m) HWY_ATTR { y[m()][a] = combination<E, m()>(along, T(0)); });
-  }
-  HALFGRAD_UNROLL
-  for (int i = 0; i < M::size; ++i) sum[i] = F::zero();
+  F g[M::num_shape][d];
   unrolled<M::num_shape>([&](auto m) HWY_ATTR {
-    F& own = sum[M::product(m(), 0)];
-    own = combination<E, m()>(moved, own);
-    F g[d];
     HALFGRAD_UNROLL
-    for (int a = 0; a < d; ++a) g[a] = combination<E, m()>(h[a], F::zero());
-    unrolled<M::num_shape>([&](auto other) HWY_ATTR {
-      constexpr int place = M::product(m(), other());
-      // Y of the monomial 1 is zero.
-      if constexpr (other() > 0 && M::multiplies(other())) {
-        HALFGRAD_UNROLL
-        for (int a = 0; a < d; ++a) sum[place] = sum[place].plus(g[a], y[other()][a]);
-      }
-    });
+    for (int a = 0; a < d; ++a) {
+      g[m()][a] = combination<E, m()>(h[a], F::zero());
+      if constexpr (m() > 0 && M::multiplies(m())) y[m()][a] = combination<E, m(), d>(rest + a, T(0));
+    }
   });
-  HALFGRAD_UNROLL
-  for (int i = 0; i < M::size; ++i) spread.columns_of(sum[i]).store(coefficients + spread.size * i);
+  // A coefficient at a time, so that its sum stays in a register.
+  unrolled<M::size>([&](auto place) HWY_ATTR {
+    F sum = F::zero();
+    unrolled<M::num_shape>([&](auto m) HWY_ATTR {
+      if constexpr (M::product(m(), 0) == place()) sum = combination<E, m()>(moved, sum);
+      unrolled<M::num_shape>([&](auto other) HWY_ATTR {
+        if constexpr (other() > 0 && M::multiplies(other()) && M::product(m(), other()) == place()) {
+          HALFGRAD_UNROLL
+          for (int a = 0; a < d; ++a) sum = sum.plus(g[m()][a], y[other()][a]);
+        }
+      });
+    });
+    spread.columns_of(sum).store(coefficients + spread.size * place());
+  });
 }
 
 // ---- runs
