@@ -97,22 +97,31 @@ HWY_INLINE void evaluate_run(const PointStage<T>& stage, const Spread<T, d>& spr
   });
 }
 
-// is_within_tolerance from the edges' vectors S.
+// Which of `count` edges have a bulge S that is_within_tolerance allows; what it asks of a cell's edges is asked once
+// an edge here.
 template <int d, class T>
-HWY_NOINLINE bool is_within_tolerance_of_edges(const PointStage<T>& stage, Index run, const T* vectors) {
-  if (stage.extrapolates != nullptr && stage.extrapolates[run] != 0) return false;
-  // Relative to the tolerance, so that squares of short lengths do not vanish in float.
-  const T per_longest = 1 / (stage.tolerance * 2 * (d + 1) / d);
-  for (int e = 0; e < num_edges(d); ++e) {
-    const T* const s = vectors + Spread<T, d>::size * stage.edges.of_run[static_cast<Offset>(run) * num_edges(d) + e];
+void find_flat_edges(const PointStage<T>& stage, const T* vectors, Offset count, std::uint8_t* flat) {
+  // Relative to the tolerance, so that squares of short lengths do not vanish in float. Lanes beyond the columns repeat
+  // them, and count for nothing.
+  T factor[max_fast_columns];
+  for (int c = 0; c < max_fast_columns; ++c)
+    factor[c] = c < stage.num_columns ? 1 / (stage.tolerance * 2 * (d + 1) / d) : 0;
+  for (Offset e = 0; e < count; ++e, vectors += Spread<T, d>::size) {
     T squared = 0;
-    for (int c = 0; c < stage.num_columns; ++c) {
-      const T component = s[c] * per_longest;
-      squared += component * component;
-    }
-    if (!(squared <= 1)) return false;
+    HALFGRAD_UNROLL
+    for (int c = 0; c < max_fast_columns; ++c) squared += vectors[c] * factor[c] * (vectors[c] * factor[c]);
+    flat[e] = squared <= 1;
   }
-  return true;
+}
+
+// Whether a run is linear within the tolerance. A NaN is not, nor is a cell with points outside.
+template <int d, class T>
+HWY_INLINE bool is_flat(const PointStage<T>& stage, Index run, const std::uint8_t* flat) {
+  if (stage.extrapolates != nullptr && stage.extrapolates[run] != 0) return false;
+  const std::uint16_t* const edge = stage.edges.of_run + static_cast<Offset>(run) * num_edges(d);
+  std::uint8_t all = 1;
+  for (int e = 0; e < num_edges(d); ++e) all &= flat[edge[e]];
+  return all != 0;
 }
 
 template <Recipe recipe, int d, class T>
@@ -123,11 +132,14 @@ void evaluate_runs(const PointStage<T>& given, Index begin, Index end) {
   const Index num_whole = spread.num_whole(stage, end);
   const bool with_tolerance = recipe == Recipe::quadratic && stage.tolerance > 0;
   HWY_ALIGN T vectors[window_size * num_edges(d) * num_edge_vectors<recipe> * spread.size + 1];
+  std::uint8_t flat[window_size * num_edges(d)];
   for (Index run = begin; run < end;) {
     const Index window = run / window_size, window_end = std::min(end, (window + 1) * window_size);
     if constexpr (recipe != Recipe::linear) set_up_edges<recipe, d>(stage, spread, window, vectors);
+    if (with_tolerance)
+      find_flat_edges<d>(stage, vectors, stage.edges.first[window + 1] - stage.edges.first[window], flat);
     for (; run < window_end; ++run) {
-      if (HWY_UNLIKELY(with_tolerance) && is_within_tolerance_of_edges<d>(given, run, vectors))
+      if (HWY_UNLIKELY(with_tolerance) && is_flat<d>(stage, run, flat))
         evaluate_run<Recipe::linear, line_length>(stage, spread, run, vectors, num_whole);
       else
         evaluate_run<recipe, line_length>(stage, spread, run, vectors, num_whole);
