@@ -13,6 +13,7 @@
 #include "framework/io/frame_source.hpp"
 #include "framework/io/npy.hpp"
 #include "framework/io/vtk_output.hpp"
+#include "support/file_test.hpp"
 #include "support/test_meshes.hpp"
 
 namespace halfgrad {
@@ -24,26 +25,21 @@ using testing::HasSubstr;
 using testing::Not;
 
 // A box of tetrahedra to which faults are added one by one.
-class Diagnosis : public testing::Test {
+class Diagnosis : public FileTest {
  protected:
   void SetUp() override {
-    directory = std::filesystem::temp_directory_path() /
-                (std::string("halfgrad_diagnosis_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(directory);
-    std::filesystem::create_directories(directory);
-    write_npy(file("points.npy"), Values<double>(points));
+    FileTest::SetUp();
+    write_npy(in("points.npy"), Values<double>(points));
   }
-  void TearDown() override { std::filesystem::remove_all(directory); }
 
-  std::string file(const std::string& name) const { return (directory / name).string(); }
-  json json_of(const std::string& name) const { return json::parse(std::ifstream(file(name))); }
+  json json_of(const std::string& name) const { return json::parse(std::ifstream(in(name))); }
   void write_rest(const Points& vertices, const Eigen::MatrixXi& further_cells) const {
     auto block = std::get<ElementBlock<Tetrahedron>>(box.blocks()[0]);
     const Eigen::Index before = block.cells.rows();
     block.cells.conservativeResize(before + further_cells.rows(), 4);
     block.cells.bottomRows(further_cells.rows()) = further_cells;
-    write_vtu(file("rest.vtu"), Mesh(vertices, {block}));
-    const auto sink = create_frames(file("frames.npy"));
+    write_vtu(in("rest.vtu"), Mesh(vertices, {block}));
+    const auto sink = create_frames(in("frames.npy"));
     sink->write(vertices);
     sink->finish();
   }
@@ -54,11 +50,10 @@ class Diagnosis : public testing::Test {
     return all;
   }
   Outcome deform(const std::string& options) const {
-    return run_program("deform --rest " + file("rest.vtu") + " --frames " + file("frames.npy") + " --points " +
-                       file("points.npy") + " --out " + file("out.npy") + " " + options);
+    return run_program("deform --rest " + in("rest.vtu") + " --frames " + in("frames.npy") + " --points " +
+                       in("points.npy") + " --out " + in("out.npy") + " " + options);
   }
 
-  std::filesystem::path directory;
   Mesh box = test::lattice<Tetrahedron>(2, 0, 1);
   Points points = test::random_points_inside(box, 20, 2);
 };
@@ -75,7 +70,7 @@ TEST_F(Diagnosis, InfoNamesWhatIsWrong) {
       n, n + 2, n + 3, n + 4,                       // without volume
       first[1], first[0], first[2], n + 3;
   write_rest(with_vertices(further), cells);
-  const Outcome shown = run_program("info --json " + file("rest.vtu"));
+  const Outcome shown = run_program("info --json " + in("rest.vtu"));
   ASSERT_EQ(shown.status, 0) << shown.output;
   const json facts = json::parse(shown.output);
   EXPECT_EQ(facts["duplicate_vertices"], (json{{"count", 1}, {"first", {n}}}));
@@ -91,7 +86,7 @@ TEST_F(Diagnosis, InfoNamesWhatIsWrong) {
   // One of the two cells across the facet from each other's apex is negative, not both.
   EXPECT_EQ(facts["inverted_cells"]["count"], 1);
 
-  const Outcome words = run_program("info " + file("rest.vtu"));
+  const Outcome words = run_program("info " + in("rest.vtu"));
   EXPECT_THAT(words.output, AllOf(HasSubstr("duplicate cells"), HasSubstr("nonmanifold facets"),
                                   HasSubstr(fmt::format("{}-{}-{}", facet[0], facet[1], facet[2]))));
   EXPECT_THAT(words.output, Not(HasSubstr("folded cells")));
@@ -101,8 +96,8 @@ TEST_F(Diagnosis, LimitsRefuseByName) {
   Points further(1, 3);
   further << box.vertices().row(3);
   write_rest(with_vertices(further), Eigen::MatrixXi(0, 4));
-  EXPECT_EQ(run_program("info --limit duplicate_vertices=1 " + file("rest.vtu")).status, 0);
-  const Outcome refused = run_program("info --limit duplicate_vertices=0 " + file("rest.vtu"));
+  EXPECT_EQ(run_program("info --limit duplicate_vertices=1 " + in("rest.vtu")).status, 0);
+  const Outcome refused = run_program("info --limit duplicate_vertices=0 " + in("rest.vtu"));
   EXPECT_EQ(refused.status, 2);
   EXPECT_THAT(refused.output, AllOf(HasSubstr("rest.vtu: found 1 duplicate vertices"),
                                     HasSubstr(fmt::format("the first is {}", box.num_vertices())),
@@ -128,7 +123,7 @@ TEST_F(Diagnosis, CellsWithoutVolumeAreRefusedUnlessALimitAcceptsThem) {
     const Outcome accepted = deform(std::string("--limit degenerate_cells=1 --reconstructor ") + reconstructor);
     ASSERT_EQ(accepted.status, 0) << accepted.output;
     Values<double> out;
-    open_frames(file("out.npy"))->read(0, out);
+    open_frames(in("out.npy"))->read(0, out);
     EXPECT_LT((out - points).cwiseAbs().maxCoeff(), 1e-13) << reconstructor;
   }
 }
@@ -137,9 +132,9 @@ TEST_F(Diagnosis, ReportsTellTheRuleOfEveryVertexAndThePointsOutside) {
   write_rest(box.vertices(), Eigen::MatrixXi(0, 4));
   points(4, 0) = 1.25;
   points(9, 1) = -0.5;
-  write_npy(file("points.npy"), Values<double>(points));
-  const std::string bind = "bind --rest " + file("rest.vtu") + " --points " + file("points.npy") + " --out " +
-                           file("x.hgb") + " --outside nearest --report " + file("report.json");
+  write_npy(in("points.npy"), Values<double>(points));
+  const std::string bind = "bind --rest " + in("rest.vtu") + " --points " + in("points.npy") + " --out " + in("x.hgb") +
+                           " --outside nearest --report " + in("report.json");
   const Outcome bound = run_program(bind);
   ASSERT_EQ(bound.status, 0) << bound.output;
   EXPECT_THAT(bound.output, AllOf(HasSubstr("outside points"), HasSubstr("4, 9")));
@@ -164,11 +159,10 @@ TEST_F(Diagnosis, ReportsTellTheRuleOfEveryVertexAndThePointsOutside) {
   EXPECT_EQ(usual + listed, total);
 
   // The same of deform, from the mesh and from the binding.
-  for (const std::string& input :
-       {"--rest " + file("rest.vtu") + " --points " + file("points.npy") + " --outside nearest",
-        "--binding " + file("x.hgb")}) {
-    const Outcome deformed = run_program("deform " + input + " --frames " + file("frames.npy") + " --out " +
-                                         file("out.npy") + " --report " + file("deform.json"));
+  for (const std::string& input : {"--rest " + in("rest.vtu") + " --points " + in("points.npy") + " --outside nearest",
+                                   "--binding " + in("x.hgb")}) {
+    const Outcome deformed = run_program("deform " + input + " --frames " + in("frames.npy") + " --out " +
+                                         in("out.npy") + " --report " + in("deform.json"));
     ASSERT_EQ(deformed.status, 0) << deformed.output;
     for (const char* key : {"mesh", "vertex_rules", "vertices_by_rule", "outside"})
       EXPECT_EQ(json_of("deform.json")[key], report[key]) << key;
@@ -183,8 +177,8 @@ TEST_F(Diagnosis, AFallbackIsToldAndCanBeRefused) {
   box = Mesh(Tetrahedron::nodes(),
              {ElementBlock<Tetrahedron>{(decltype(ElementBlock<Tetrahedron>::cells)(1, 4) << 0, 1, 2, 3).finished()}});
   write_rest(box.vertices(), Eigen::MatrixXi(0, 4));
-  write_npy(file("points.npy"), Values<double>(Values<double>::Constant(1, 3, 0.2)));
-  ASSERT_EQ(deform("--reconstructor kriging --report " + file("r.json")).status, 0);
+  write_npy(in("points.npy"), Values<double>(Values<double>::Constant(1, 3, 0.2)));
+  ASSERT_EQ(deform("--reconstructor kriging --report " + in("r.json")).status, 0);
   const json report = json_of("r.json");
   std::int64_t fallen = 0;
   for (const char* rule : {"damped", "cell_value"})

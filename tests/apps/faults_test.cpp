@@ -16,6 +16,7 @@
 #include "framework/io/frame_sink.hpp"
 #include "framework/io/frame_source.hpp"
 #include "framework/io/vtk_output.hpp"
+#include "support/file_test.hpp"
 #include "support/test_meshes.hpp"
 
 namespace halfgrad {
@@ -25,61 +26,42 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-class Faults : public testing::Test {
+class Faults : public FileTest {
  protected:
   void SetUp() override {
-    directory = std::filesystem::temp_directory_path() /
-                (std::string("halfgrad_faults_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(directory);
-    std::filesystem::create_directories(directory);
-    write_vtu(file("rest.vtu"), mesh);
-    write_vtp(file("points.vtp"), test::random_points_inside(mesh, 200, 2));
+    FileTest::SetUp();
+    write_vtu(in("rest.vtu"), mesh);
+    write_vtp(in("points.vtp"), test::random_points_inside(mesh, 200, 2));
   }
-  void TearDown() override { std::filesystem::remove_all(directory); }
 
-  std::string file(const std::string& name) const { return (directory / name).string(); }
   Points frame(int number) const { return mesh.vertices() * (1 + 0.01 * number); }
   void write_frames(int count) const {
-    const auto sink = create_frames(file("frames.npy"));
+    const auto sink = create_frames(in("frames.npy"));
     for (int f = 0; f < count; ++f) sink->write(frame(f));
     sink->finish();
   }
-  void write_frame_file(int number) const { write_vtp(file(fmt::format("sim_{:04}.vtp", number)), frame(number)); }
+  void write_frame_file(int number) const { write_vtp(in(fmt::format("sim_{:04}.vtp", number)), frame(number)); }
   std::string arguments(const std::string& frames, const std::string& out) const {
-    return "deform --quiet --rest " + file("rest.vtu") + " --frames '" + file(frames) + "' --points " +
-           file("points.vtp") + " --out " + file(out);
+    return "deform --quiet --rest " + in("rest.vtu") + " --frames '" + in(frames) + "' --points " + in("points.vtp") +
+           " --out " + in(out);
   }
   // With files of at most this many units of 512 bytes, as on a disk that has no more room; the signal that comes with
   // this limit and with no full disk is ignored.
   Outcome with_little_room(int units, const std::string& arguments) const {
-    std::ofstream(file("limited.sh")) << "trap '' XFSZ\nulimit -f " << units << "\nexec " << HALFGRAD_PROGRAM << " "
-                                      << arguments << "\n";
-    return run_command("sh " + file("limited.sh"));
+    std::ofstream(in("limited.sh")) << "trap '' XFSZ\nulimit -f " << units << "\nexec " << HALFGRAD_PROGRAM << " "
+                                    << arguments << "\n";
+    return run_command("sh " + in("limited.sh"));
   }
-  static Outcome run_command(const std::string& command) {
-    std::FILE* pipe = popen((command + " 2>&1").c_str(), "r");
-    Outcome outcome{-1, ""};
-    std::array<char, 4096> buffer;
-    while (const std::size_t got = std::fread(buffer.data(), 1, buffer.size(), pipe))
-      outcome.output.append(buffer.data(), got);
-    const int status = pclose(pipe);
-    outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    return outcome;
-  }
-  std::string content(const std::string& name) const {
-    std::ifstream in(file(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
+  std::string content(const std::string& name) const { return contents_of(file(name)); }
   std::vector<std::string> outputs() const {
     std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(directory))
+    for (const auto& entry : std::filesystem::directory_iterator(folder_))
       if (const std::string name = entry.path().filename().string(); name.find("out") != std::string::npos)
         names.push_back(name);
     std::sort(names.begin(), names.end());
     return names;
   }
 
-  std::filesystem::path directory;
   Mesh mesh = test::lattice<Tetrahedron>(3, 0.1, 1);
 };
 
@@ -88,7 +70,7 @@ TEST_F(Faults, AFullDiskKeepsWholeFramesAndResumeEndsInTheSameBytes) {
   write_frames(20);
   ASSERT_EQ(run_program(arguments("frames.npy", "whole_out.npy")).status, 0);
   const std::string expected = content("whole_out.npy");
-  std::filesystem::remove(file("whole_out.npy"));
+  std::filesystem::remove(in("whole_out.npy"));
   const Outcome full = with_little_room(100, arguments("frames.npy", "out.npy"));
   EXPECT_EQ(full.status, 2) << full.output;
   EXPECT_THAT(full.output, AllOf(HasSubstr("out.npy: cannot be written"), HasSubstr("10 of 20 frames are kept"),
@@ -108,13 +90,13 @@ TEST_F(Faults, AFullDiskLeavesNoHalfFileUnderAName) {
     EXPECT_EQ(full.status, 2) << full.output;
     EXPECT_THAT(full.output, HasSubstr("cannot be written"));
     for (const std::string& found : outputs()) EXPECT_EQ(found.front(), '.') << found;
-    for (const std::string& found : outputs()) std::filesystem::remove(file(found));
+    for (const std::string& found : outputs()) std::filesystem::remove(in(found));
   }
-  const std::string bind = "bind --rest " + file("rest.vtu") + " --points " + file("points.vtp") + " --out ";
-  EXPECT_THAT(with_little_room(4, bind + file("out.hgb")).output, HasSubstr("out.hgb: cannot be written"));
+  const std::string bind = "bind --rest " + in("rest.vtu") + " --points " + in("points.vtp") + " --out ";
+  EXPECT_THAT(with_little_room(4, bind + in("out.hgb")).output, HasSubstr("out.hgb: cannot be written"));
   EXPECT_THAT(outputs(), ElementsAre());
-  EXPECT_THAT(with_little_room(4, "export --rest " + file("rest.vtu") + " --points " + file("points.vtp") + " --out " +
-                                      file("out.mtx"))
+  EXPECT_THAT(with_little_room(
+                  4, "export --rest " + in("rest.vtu") + " --points " + in("points.vtp") + " --out " + in("out.mtx"))
                   .output,
               HasSubstr("out.mtx: cannot be written"));
   EXPECT_THAT(outputs(), ElementsAre());
@@ -130,15 +112,14 @@ TEST_F(Faults, FoldersThatCannotBeWrittenAreNamed) {
   refused("absent/out.npy", "No such file");
   refused("rest.vtu/out.npy", "Not a directory");
   for (const char* name : {"out.npy", "out.%d.obj", "out.pvd"}) {
-    std::filesystem::create_directory(file("locked"));
-    std::filesystem::permissions(file("locked"),
-                                 std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+    std::filesystem::create_directory(in("locked"));
+    std::filesystem::permissions(in("locked"), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
     // The superuser may write everywhere.
     if (::geteuid() != 0) refused(std::string("locked/") + name, "Permission denied");
-    std::filesystem::permissions(file("locked"), std::filesystem::perms::owner_all);
-    std::filesystem::remove(file("locked"));
+    std::filesystem::permissions(in("locked"), std::filesystem::perms::owner_all);
+    std::filesystem::remove(in("locked"));
   }
-  std::filesystem::create_directory(file("out.npy"));
+  std::filesystem::create_directory(in("out.npy"));
   refused("out.npy", "found a folder");
 }
 
@@ -149,31 +130,31 @@ TEST_F(Faults, FramesThatAreMissingShorterOrOfAnotherMeshAreNamed) {
     const Outcome outcome = run(frames);
     EXPECT_EQ(outcome.status, 2) << outcome.output;
     EXPECT_THAT(outcome.output, facts);
-    EXPECT_FALSE(std::filesystem::exists(file("out.npy")));
+    EXPECT_FALSE(std::filesystem::exists(in("out.npy")));
   };
   ASSERT_EQ(run("sim_%04d.vtp").status, 0);
-  std::filesystem::remove(file("out.npy"));
+  std::filesystem::remove(in("out.npy"));
 
-  std::filesystem::remove(file("sim_0003.vtp"));
+  std::filesystem::remove(in("sim_0003.vtp"));
   refused("sim_%04d.vtp", AllOf(HasSubstr("sim_0003.vtp is missing"), HasSubstr("between sim_0002.vtp")));
   // One that goes while the others are read: the collection names it.
-  std::ofstream(file("sim.pvd")) << "<VTKFile type=\"Collection\"><Collection>"
-                                    "<DataSet timestep=\"0\" file=\"sim_0002.vtp\"/>"
-                                    "<DataSet timestep=\"1\" file=\"sim_0003.vtp\"/>"
-                                    "<DataSet timestep=\"2\" file=\"sim_0004.vtp\"/></Collection></VTKFile>";
+  std::ofstream(in("sim.pvd")) << "<VTKFile type=\"Collection\"><Collection>"
+                                  "<DataSet timestep=\"0\" file=\"sim_0002.vtp\"/>"
+                                  "<DataSet timestep=\"1\" file=\"sim_0003.vtp\"/>"
+                                  "<DataSet timestep=\"2\" file=\"sim_0004.vtp\"/></Collection></VTKFile>";
   refused("sim.pvd", AllOf(HasSubstr("sim_0003.vtp"), HasSubstr("No such file"), HasSubstr("1 of 3 frames")));
 
-  write_vtp(file("sim_0003.vtp"), Points(frame(3).topRows(20)));
+  write_vtp(in("sim_0003.vtp"), Points(frame(3).topRows(20)));
   refused("sim_%04d.vtp", AllOf(HasSubstr("sim_0003.vtp"), HasSubstr("frame 3"), HasSubstr("20 vertices"),
                                 HasSubstr(fmt::format("expected {}", mesh.num_vertices()))));
   write_frame_file(3);
   const std::string whole = content("sim_0004.vtp");
-  std::ofstream(file("sim_0004.vtp"), std::ios::binary) << whole.substr(0, whole.size() / 2);
+  std::ofstream(in("sim_0004.vtp"), std::ios::binary) << whole.substr(0, whole.size() / 2);
   refused("sim_%04d.vtp", AllOf(HasSubstr("sim_0004.vtp"), HasSubstr("4 of 6 frames are kept")));
 
   write_frames(5);
   const std::string frames = content("frames.npy");
-  std::ofstream(file("frames.npy"), std::ios::binary) << frames.substr(0, frames.size() - 100);
+  std::ofstream(in("frames.npy"), std::ios::binary) << frames.substr(0, frames.size() - 100);
   refused("frames.npy", AllOf(HasSubstr("frames.npy"), HasSubstr("bytes follow")));
 }
 
@@ -197,12 +178,12 @@ TEST_F(Faults, MemoryDoesNotGrowWithTheNumberOfFrames) {
   GTEST_SKIP() << "sanitizers keep freed memory";
 #endif
   mesh = test::lattice<Tetrahedron>(16, 0, 1);
-  write_vtu(file("rest.vtu"), mesh);
+  write_vtu(in("rest.vtu"), mesh);
   constexpr int few = 5, many = 200;
   // Hard links of one file are frames enough.
   write_frame_file(0);
   for (int f = 1; f < many; ++f)
-    std::filesystem::create_hard_link(file("sim_0000.vtp"), file(fmt::format("sim_{:04}.vtp", f)));
+    std::filesystem::create_hard_link(in("sim_0000.vtp"), in(fmt::format("sim_{:04}.vtp", f)));
   const std::string all = arguments("sim_%04d.vtp", "out.npy");
   const std::int64_t of_few = peak_memory(all + fmt::format(" --last {}", few - 1)), of_all = peak_memory(all);
   // Frames that were kept would take this much more; a tenth of it is what allocators may differ by.

@@ -15,6 +15,7 @@
 #include "framework/io/frame_source.hpp"
 #include "framework/io/npy.hpp"
 #include "framework/io/vtk_output.hpp"
+#include "support/file_test.hpp"
 #include "support/shared_data.hpp"
 #include "support/test_meshes.hpp"
 
@@ -27,22 +28,18 @@ using testing::HasSubstr;
 using testing::Not;
 
 // A jittered box of tetrahedra, a small surface inside it, and three frames: rest, a rotation, a quadratic map.
-class Program : public testing::Test {
+class Program : public FileTest {
  protected:
   void SetUp() override {
-    directory = std::filesystem::temp_directory_path() /
-                (std::string("halfgrad_program_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(directory);
-    std::filesystem::create_directories(directory);
-    write_vtu(directory / "rest.vtu", mesh);
+    FileTest::SetUp();
+    write_vtu(folder_ / "rest.vtu", mesh);
     surface.points.resize(4, 3);
     surface.points << 0.3, 0.3, 0.4, 0.7, 0.3, 0.4, 0.7, 0.7, 0.4, 0.3, 0.7, 0.5;
     surface.faces.offsets = {0, 3, 6};
     surface.faces.entries = {0, 1, 2, 0, 2, 3};
-    write_vtp(directory / "points.vtp", surface.points, surface.faces);
+    write_vtp(folder_ / "points.vtp", surface.points, surface.faces);
     write_frames({mesh.vertices(), rotated(mesh.vertices()), bent(mesh.vertices())});
   }
-  void TearDown() override { std::filesystem::remove_all(directory); }
 
   static Points rotated(const Points& points) {
     const Eigen::Matrix3d rotation = Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
@@ -54,11 +51,10 @@ class Program : public testing::Test {
     return result;
   }
   void write_frames(const std::vector<Points>& frames) const {
-    const auto sink = create_frames(directory / "frames.npy");
+    const auto sink = create_frames(folder_ / "frames.npy");
     for (const Points& frame : frames) sink->write(frame);
     sink->finish();
   }
-  std::string in(const std::string& name) const { return (directory / name).string(); }
   Outcome deform(const std::string& options, const std::string& out = "out.npy") const {
     return run_program("deform --rest " + in("rest.vtu") + " --frames " + in("frames.npy") + " --points " +
                        in("points.vtp") + " --out " + in(out) + " " + options);
@@ -70,13 +66,12 @@ class Program : public testing::Test {
   }
   std::vector<std::string> files() const {
     std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(directory))
+    for (const auto& entry : std::filesystem::directory_iterator(folder_))
       names.push_back(entry.path().filename().string());
     std::sort(names.begin(), names.end());
     return names;
   }
 
-  std::filesystem::path directory;
   Mesh mesh = test::lattice<Tetrahedron>(4, 0.2, 3);
   PointSet surface;
 };
@@ -212,7 +207,7 @@ TEST_F(Program, NormalsTurnWithTheSurface) {
   EXPECT_LT((frame("out.normals.npy", 1) - rotated(before)).norm(), 1e-13);
   // The first frame is the rest state: F = I. Frames of nine columns are no positions, so the numbers are read plainly.
   constexpr std::size_t num_numbers = 3 * 4 * 9;
-  const std::filesystem::path path = directory / "out.gradients.npy";
+  const std::filesystem::path path = folder_ / "out.gradients.npy";
   ASSERT_GT(std::filesystem::file_size(path), num_numbers * sizeof(double));
   std::ifstream file(path, std::ios::binary);
   file.seekg(static_cast<std::streamoff>(std::filesystem::file_size(path) - num_numbers * sizeof(double)));
@@ -260,7 +255,7 @@ TEST_F(Program, TangentsComeFromTheTextureAndTurnWithTheSurface) {
   Values<double> uv(4, 2), own(4, 4);
   uv << 0, 0, 1, 0, 1, 1, 0, 1;
   own << Eigen::RowVector4d(0, 1, 0, -1).replicate(4, 1);
-  write_vtp(directory / "both.vtp", surface.points, surface.faces,
+  write_vtp(folder_ / "both.vtp", surface.points, surface.faces,
             std::vector{PointArray{"uv", uv}, PointArray{"Tangents", own}});
   ASSERT_EQ(carry("both.vtp", "", "out.pvd").status, 0);
   const PointSet result = read_points(in("out_0000.vtp"));
@@ -300,8 +295,8 @@ TEST_F(Program, AMeshFarFromTheOriginGivesTheSameAnswer) {
   const Values<double> near = frame("out.npy", 2);
   constexpr double offset = 1e8;
   const auto moved = [&](const Points& points) { return Points(points.array() + offset); };
-  write_vtu(directory / "rest.vtu", Mesh(moved(mesh.vertices()), mesh.blocks()));
-  write_vtp(directory / "points.vtp", moved(surface.points), surface.faces);
+  write_vtu(folder_ / "rest.vtu", Mesh(moved(mesh.vertices()), mesh.blocks()));
+  write_vtp(folder_ / "points.vtp", moved(surface.points), surface.faces);
   write_frames({moved(mesh.vertices()), moved(rotated(mesh.vertices())), moved(bent(mesh.vertices()))});
   const Outcome outcome = deform("");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
@@ -310,7 +305,7 @@ TEST_F(Program, AMeshFarFromTheOriginGivesTheSameAnswer) {
 
 TEST_F(Program, PointsOutsideFollowThePolicy) {
   surface.points(2, 0) = 1.5;
-  write_vtp(directory / "points.vtp", surface.points, surface.faces);
+  write_vtp(folder_ / "points.vtp", surface.points, surface.faces);
   const Outcome refused = deform("");
   EXPECT_EQ(refused.status, 2);
   EXPECT_THAT(refused.output, AllOf(HasSubstr("1 of 4 points"), HasSubstr("nearest"), HasSubstr("mark")));
@@ -467,11 +462,11 @@ TEST_F(Program, ASavedBindingGivesTheSameBytes) {
   refused(" --reconstructor kriging", "bind again");
   refused(" --outside mark", "bind again");
   surface.points(0, 0) += 0.01;
-  write_vtp(directory / "points.vtp", surface.points, surface.faces);
+  write_vtp(folder_ / "points.vtp", surface.points, surface.faces);
   refused("", "other points");
   surface.points(0, 0) -= 0.01;
-  write_vtp(directory / "points.vtp", surface.points, surface.faces);
-  write_vtu(directory / "rest.vtu", test::lattice<Tetrahedron>(4, 0.2, 4));
+  write_vtp(folder_ / "points.vtp", surface.points, surface.faces);
+  write_vtu(folder_ / "rest.vtu", test::lattice<Tetrahedron>(4, 0.2, 4));
   refused("", "another rest mesh");
   std::filesystem::resize_file(in("x.hgb"), std::filesystem::file_size(in("x.hgb")) / 2);
   refused("", "no binding");
@@ -485,10 +480,10 @@ TEST_F(Program, FieldsAndSmoothNormalsAreCarried) {
   field.col(0) = mesh.vertices().col(0) * 3 - mesh.vertices().col(1);
   field.col(1).setConstant(7);
   write_npy(in("stress.npy"), field);
-  write_vtu(directory / "rest.vtu", mesh, std::vector{PointArray{"heat", field}});
+  write_vtu(folder_ / "rest.vtu", mesh, std::vector{PointArray{"heat", field}});
   Values<double> uv(4, 2);
   uv << 0, 0, 1, 0, 1, 1, 0, 1;
-  write_vtp(directory / "points.vtp", surface.points, surface.faces, std::vector{PointArray{"uv", uv}});
+  write_vtp(folder_ / "points.vtp", surface.points, surface.faces, std::vector{PointArray{"uv", uv}});
   const Outcome outcome =
       deform("--field heat --field stress=" + in("stress.npy") + " --normals smooth --stretch", "out.pvd");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
@@ -529,7 +524,7 @@ TEST_F(Program, RunExitsWith3WhereAnExpectationFails) {
   const std::string command = "run " + in("config.json") + " --out " + in("results");
   const Outcome good = run_program(command);
   ASSERT_EQ(good.status, 0) << good.output;
-  EXPECT_TRUE(std::filesystem::exists(directory / "results" / "results.json"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "results" / "results.json"));
   EXPECT_EQ(run_program("check " + in("config.json")).status, 0);
 
   const Outcome failed = run_program(command + " --set /expect/0/order_at_least=2.9");

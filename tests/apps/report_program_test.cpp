@@ -12,6 +12,7 @@
 #include "framework/io/frame_source.hpp"
 #include "framework/io/npy.hpp"
 #include "framework/io/vtk_output.hpp"
+#include "support/file_test.hpp"
 #include "support/test_meshes.hpp"
 
 namespace halfgrad {
@@ -22,22 +23,9 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-class ReportProgram : public testing::Test {
+class ReportProgram : public FileTest {
  protected:
-  void SetUp() override {
-    folder = std::filesystem::temp_directory_path() /
-             (std::string("halfgrad_report_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(folder);
-    std::filesystem::create_directories(folder);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder); }
-  std::string in(const std::string& name) const { return (folder / name).string(); }
-  std::string text(const std::string& name) const {
-    std::ifstream file(in(name));
-    std::ostringstream content;
-    content << file.rdbuf();
-    return content.str();
-  }
+  std::string text(const std::string& name) const { return contents_of(file(name)); }
   /// Runs a small configuration under a name.
   void run(const std::string& name) const {
     std::ofstream(in(name + ".json")) << json{{"name", name},
@@ -48,8 +36,6 @@ class ReportProgram : public testing::Test {
                                               {"outputs", {"json", "html"}}};
     EXPECT_EQ(run_program("run --quiet " + in(name + ".json") + " --out " + in(name)).status, 0);
   }
-
-  std::filesystem::path folder;
 };
 
 TEST_F(ReportProgram, MergesRunsIntoOnePageThatNeedsNothingElse) {
@@ -83,7 +69,7 @@ TEST_F(ReportProgram, MergesRunsIntoOnePageThatNeedsNothingElse) {
 
 TEST_F(ReportProgram, RefusesFoldersWithoutResultsByName) {
   run("good");
-  std::filesystem::create_directories(folder / "empty");
+  std::filesystem::create_directories(folder_ / "empty");
   const Outcome missing = run_program("report " + in("good") + " " + in("empty") + " --out " + in("page.html"));
   EXPECT_EQ(missing.status, 2);
   EXPECT_THAT(missing.output, AllOf(HasSubstr("empty"), HasSubstr("results.json")));
@@ -91,7 +77,7 @@ TEST_F(ReportProgram, RefusesFoldersWithoutResultsByName) {
   const Outcome wrong = run_program("report " + in("empty") + " --out " + in("page.html"));
   EXPECT_EQ(wrong.status, 2);
   EXPECT_THAT(wrong.output, HasSubstr("not the results of a run"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "page.html"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "page.html"));
   EXPECT_EQ(run_program("report").status, 2);
 }
 

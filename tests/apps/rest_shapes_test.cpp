@@ -12,39 +12,28 @@
 #include "framework/io/frame_source.hpp"
 #include "framework/io/mesh_file.hpp"
 #include "framework/io/npy.hpp"
+#include "support/file_test.hpp"
 
 namespace halfgrad {
 namespace {
 
 using testing::HasSubstr;
 
-class RestShapes : public testing::Test {
+class RestShapes : public FileTest {
  protected:
-  void SetUp() override {
-    directory = std::filesystem::temp_directory_path() /
-                (std::string("halfgrad_shapes_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(directory);
-    std::filesystem::create_directories(directory);
-  }
-  void TearDown() override { std::filesystem::remove_all(directory); }
-
-  std::string in(const std::string& name) const { return (directory / name).string(); }
-  void write(const std::string& name, const std::string& text) const { std::ofstream(directory / name) << text; }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
   void write_array(const std::string& name, const Points& points) const {
-    const auto sink = create_frames(directory / name);
+    const auto sink = create_frames(folder_ / name);
     sink->write(points);
     sink->finish();
   }
-  void write_points(const std::string& name, const Points& points) const { write_npy(directory / name, points); }
+  void write_points(const std::string& name, const Points& points) const { write_npy(folder_ / name, points); }
   Values<double> read_array(const std::string& name) const {
     Values<double> values;
     open_frames(in(name))->read(0, values);
     return values;
   }
-  std::string content(const std::string& name) const {
-    std::ifstream file(directory / name, std::ios::binary);
-    return std::string(std::istreambuf_iterator<char>(file), {});
-  }
+  std::string content(const std::string& name) const { return contents_of(file(name)); }
   /// What deform writes by a saved binding has the same bytes as without; other points are refused.
   void expect_same_bytes_when_bound(const std::string& rest, const std::string& options = "") {
     SCOPED_TRACE(rest + " " + options);
@@ -66,7 +55,6 @@ class RestShapes : public testing::Test {
     return outcome.status;
   }
 
-  std::filesystem::path directory;
   std::string output;
 };
 
@@ -92,7 +80,7 @@ TEST_F(RestShapes, GridsCarryPoints) {
   EXPECT_THAT(output, HasSubstr("centered_difference"));
   // Quadratic fields are exact, boundary cells included.
   EXPECT_LT((read_array("out.npy") - parabola(points)).cwiseAbs().maxCoeff(), 1e-12);
-  const nlohmann::json report = nlohmann::json::parse(std::ifstream(directory / "report.json"));
+  const nlohmann::json report = nlohmann::json::parse(std::ifstream(folder_ / "report.json"));
   EXPECT_EQ(report["counts"]["vertices"], 36);
   ASSERT_EQ(run(arguments + " --reconstructor adaptive"), 0) << output;
   ASSERT_EQ(run("info " + in("grid.vti")), 0) << output;

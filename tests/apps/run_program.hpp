@@ -15,8 +15,8 @@ struct Outcome {
   std::string output;  ///< stdout and stderr
 };
 
-inline Outcome run_program(const std::string& arguments) {
-  std::FILE* pipe = popen((std::string(HALFGRAD_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
+inline Outcome run_command(const std::string& command) {
+  std::FILE* pipe = popen((command + " 2>&1").c_str(), "r");
   Outcome outcome{-1, ""};
   std::array<char, 4096> buffer;
   while (const std::size_t got = std::fread(buffer.data(), 1, buffer.size(), pipe))
@@ -24,6 +24,10 @@ inline Outcome run_program(const std::string& arguments) {
   const int status = pclose(pipe);
   outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   return outcome;
+}
+
+inline Outcome run_program(const std::string& arguments) {
+  return run_command(std::string(HALFGRAD_PROGRAM) + " " + arguments);
 }
 
 }  // namespace halfgrad

@@ -10,12 +10,12 @@
 
 #include "experiments/expectations.hpp"
 #include "framework/error.hpp"
+#include "support/file_test.hpp"
 #include "support/message_of.hpp"
 
 namespace halfgrad {
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
 
@@ -90,17 +90,8 @@ TEST(Expectations, RefuseWhatMatchesNothingAndWhatBoundsNothing) {
               HasSubstr("did you mean \"order_at_least\""));
 }
 
-/// A folder of its own for each test, removed at its end.
-class Run : public testing::Test {
+class Run : public FileTest {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              (std::string("halfgrad_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path config(const json& changes) const {
     json document = json::parse(R"({
       "mesh": {"lattice": {"element": "triangle", "cells": 4}, "refinements": 2},
@@ -113,8 +104,6 @@ class Run : public testing::Test {
   std::string refusal(const char* changes) const {
     return message_of([&] { run_experiment(config(json::parse(changes)), {.check_only = true}); });
   }
-
-  fs::path folder_;
 };
 
 TEST_F(Run, WritesResultsWithTheContractsFields) {

@@ -16,11 +16,11 @@
 #include "framework/error.hpp"
 #include "framework/io/mesh_file.hpp"
 #include "reconstruction/registry.hpp"
+#include "support/file_test.hpp"
 
 namespace halfgrad {
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
 
@@ -78,15 +78,8 @@ TEST(TwoTetrahedra, VerticesOfOneCellHaveItsGradient) {
   }
 }
 
-class FigureRun : public testing::Test {
+class FigureRun : public FileTest {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              (std::string("halfgrad_figure_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   ExperimentResult run(const char* text, bool check_only = false) const {
     std::ofstream(folder_ / "c.json") << text;
     return run_experiment(folder_ / "c.json", {.check_only = check_only});
@@ -99,8 +92,6 @@ class FigureRun : public testing::Test {
     }
     return "no error";
   }
-
-  fs::path folder_;
 };
 
 TEST_F(FigureRun, ASequenceEndsWithTheFieldItself) {
