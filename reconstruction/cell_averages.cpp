@@ -35,14 +35,20 @@ template <int D>
 void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
   using Direction = Eigen::Matrix<double, D, 1>;
   using Square = Eigen::Matrix<double, D, D>;
-  Square normal = epsilon * Square::Identity();
+  // The upper triangle in numbers of its own: as a matrix it would go through memory for every cell.
+  double upper[D][D] = {};
+  for (int a = 0; a < D; ++a) upper[a][a] = epsilon;
   Direction sum = Direction::Zero();
   for (const Vector& offset : star.offsets) {
     star.weights.push_back(1 / offset.template head<D>().norm());
     const Direction direction = offset.template head<D>() * star.weights.back();
-    normal += direction * direction.transpose();
+    for (int a = 0; a < D; ++a)
+      for (int b = a; b < D; ++b) upper[a][b] += direction[a] * direction[b];
     sum += direction;
   }
+  Square normal;
+  for (int a = 0; a < D; ++a)
+    for (int b = 0; b < D; ++b) normal(a, b) = upper[std::min(a, b)][std::max(a, b)];
   // The trace of the inverse is between one and D times that of the least eigenvalue.
   const Square inverse = normal.inverse();
   const double least = 1 / inverse.trace();
