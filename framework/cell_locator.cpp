@@ -1,13 +1,16 @@
-// The points are sorted into a grid and the cells stream past it, so that no index of the cells is built:
+// The points are sorted into boxes and the cells stream past them, so that no index of the cells is built:
 //
-//   grid of boxes, the last axis fastest      x[0]: | box 0 | box 1 | box 2 | …      one array a coordinate,
+//   boxes of one slab, the last axis fastest  x[0]: | box 0 | box 1 | box 2 | …      one array a coordinate,
 //   first[box] … first[box + 1] are its       x[1]: | box 0 | box 1 | box 2 | …      and beside them per point the
 //   points in the sorted arrays               x[2]: | box 0 | box 1 | box 2 | …      best margin and its cell
 //
 // The boxes that a cell's bounds meet along the last axis are one contiguous range of points: a row. A cell tests rows.
 // ξ waits in this order too: written at the caller's places while cells are tested, it would miss the cache each time.
-// The result is allocated when the coordinates are no longer needed. In R³ this takes 64 bytes a point (16 less a
-// dimension less), at most 8 more for the boxes, and with several threads 4 bytes a cell and slab that it meets.
+//
+// A slab has a range of the boxes along the first axis. One suffices for a million points on one thread; more points
+// are cut into more, so that neither the working set nor the memory beside the result grows with their number, and
+// threads take slabs. In R³ a slab takes 64 bytes a point (16 less a dimension less), at most 8 more for the boxes, and
+// where there are several 4 bytes for each of the points and for each cell and slab that it meets.
 #include "framework/cell_locator.hpp"
 
 #include <algorithm>
@@ -16,8 +19,10 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <span>
 
 #include "framework/inverse_map.hpp"
+#include "framework/large_array.hpp"
 #include "framework/parallel.hpp"
 #include "framework/plane_margins.hpp"
 
@@ -109,82 +114,40 @@ CellStatistics<D> cell_statistics(const Mesh& mesh, double tolerance) {
   return result;
 }
 
-// The points within the mesh's bounds, sorted by boxes.
+// The boxes: a regular lattice over the points. A slice is a layer of them along axis 0.
 template <int D>
-class PointGrid {
+class Boxes {
  public:
-  PointGrid(const Points& points, const CellStatistics<D>& cells, Index num_cells);
+  // For points of these bounds.
+  Boxes(const Bounds<D>& bounds, Index num_points, const CellStatistics<D>& cells, Index num_cells);
 
-  Index num_points() const { return static_cast<Index>(cell.size()); }
   int size(int axis) const { return size_[axis]; }
-  // Boxes along an axis that hold a coordinate; monotone, so that no rounding separates a point from its cell.
+  std::int64_t boxes_a_slice() const {
+    std::int64_t number = 1;
+    for (int a = 1; a < D; ++a) number *= size_[a];
+    return number;
+  }
+  // The box along an axis that holds a coordinate; monotone, so that no rounding separates a point from its cell.
   int box(int axis, double coordinate) const {
     const double scaled = (coordinate - bounds_.low[axis]) * per_length_[axis];
     return static_cast<int>(std::min(std::max(scaled, 0.0), size_[axis] - 1.0));
   }
   bool meets(const Bounds<D>& cell_bounds) const { return bounds_.meets(cell_bounds); }
-
-  Coordinates<D> position(Index point) const {
-    Coordinates<D> result;
-    for (int a = 0; a < D; ++a) result[a] = x[a][point];
-    return result;
-  }
-
-  // Calls f(begin, end) for each row of points that the bounds meet, between boxes first and last along axis 0.
-  template <class Function>
-  void for_each_row(const Bounds<D>& range, int first_slice, int last_slice, Function&& f) const {
-    std::array<int, D> low, high, at;
-    for (int a = 0; a < D; ++a) {
-      low[a] = box(a, range.low[a]);
-      high[a] = box(a, range.high[a]);
-    }
-    low[0] = std::max(low[0], first_slice);
-    high[0] = std::min(high[0], last_slice);
-    if (low[0] > high[0]) return;
-    at = low;
-    while (true) {
-      std::int64_t row = 0;
-      for (int a = 0; a < D - 1; ++a) row = (row + at[a]) * size_[a + 1];
-      // In one dimension the slices are the row's own axis.
-      const Index begin = first_[row + low[D - 1]], end = first_[row + high[D - 1] + 1];
-      if (begin < end) f(begin, end);
-      int a = D - 2;
-      while (a >= 0 && at[a] == high[a]) at[a] = low[a], --a;
-      if (a < 0) return;
-      ++at[a];
-    }
-  }
-
-  std::array<std::vector<double>, D> x;  // sorted coordinates, and max_lanes unused
-  std::vector<double> margin;            // greatest so far, and max_lanes unused
-  std::vector<Index> cell;               // of that margin; −1: none yet
-  std::vector<Coordinates<D>> xi;        // in that cell
-  std::vector<Index> place;              // of each of the caller's points; −1 outside the mesh's bounds
+  bool contains(const Coordinates<D>& position) const { return bounds_.contains(position); }
 
  private:
   Bounds<D> bounds_;  // of the points
   Coordinates<D> per_length_;
   std::array<int, D> size_{};
-  std::vector<Index> first_;  // #boxes + 1
 };
 
 template <int D>
-PointGrid<D>::PointGrid(const Points& points, const CellStatistics<D>& cells, Index num_cells) {
-  const Index count = static_cast<Index>(points.rows());
-  const auto coordinates = points.template leftCols<D>();
-  place.assign(count, -1);
-  Index num_kept = 0;
-  for (Index p = 0; p < count; ++p) {
-    const Coordinates<D> position = coordinates.row(p).transpose();
-    if (!cells.bounds.contains(position)) continue;
-    place[p] = 0;
-    ++num_kept;
-    bounds_.include(position);
-  }
+Boxes<D>::Boxes(const Bounds<D>& bounds, Index num_points, const CellStatistics<D>& cells, Index num_cells)
+    : bounds_(bounds) {
   // Boxes in proportion to the cells' extents, so that a stretched mesh looks as an isotropic one; about one box for
   // two cells, and no more than two a point.
-  const Coordinates<D> extent = num_kept > 0 ? Coordinates<D>(bounds_.high - bounds_.low) : Coordinates<D>::Zero();
-  const double target = std::max(1.0, std::min(0.5 * num_cells, 2.0 * num_kept));
+  const Coordinates<D> extent = num_points > 0 ? Coordinates<D>(bounds_.high - bounds_.low) : Coordinates<D>::Zero();
+  const double target = std::max(1.0, std::min(0.5 * num_cells, 2.0 * num_points));
   Coordinates<D> in_cells;
   for (int a = 0; a < D; ++a)
     in_cells[a] = extent[a] > 0 ? extent[a] / std::max(cells.mean_extent[a], 1e-9 * extent[a]) : 0;
@@ -203,36 +166,140 @@ PointGrid<D>::PointGrid(const Points& points, const CellStatistics<D>& cells, In
       if (!flat[a] && in_cells[a] * factor < 1) flat[a] = changed = true;
     if (!changed) break;
   }
-  std::int64_t num_boxes = 1;
   for (int a = 0; a < D; ++a) {
     size_[a] = flat[a] || in_cells[a] == 0 ? 1 : static_cast<int>(std::max(1.0, std::floor(in_cells[a] * factor)));
     per_length_[a] = extent[a] > 0 ? size_[a] / extent[a] : 0;
     if (!std::isfinite(per_length_[a])) per_length_[a] = 0;
-    num_boxes *= size_[a];
+  }
+}
+
+// A contiguous range of slices, its points by the caller's numbers, ascending, and the cells of each block that meet
+// it, ascending, as rows of the block. Where one slab has all, nothing is listed.
+struct Slab {
+  int first_slice, last_slice;
+  const Index* points = nullptr;
+  Index num_points = 0;
+  std::vector<std::vector<Index>> rows;
+
+  bool is_whole() const { return points == nullptr; }
+};
+
+// The points of a slab, sorted by boxes.
+template <int D>
+class SlabPoints {
+ public:
+  SlabPoints(const Points& points, const Boxes<D>& boxes, const Slab& slab);
+
+  bool meets(const Bounds<D>& cell_bounds) const { return boxes_.meets(cell_bounds); }
+
+  Coordinates<D> position(Index point) const {
+    Coordinates<D> result;
+    for (int a = 0; a < D; ++a) result[a] = x[a][point];
+    return result;
   }
 
+  // Calls f(begin, end) for each row of points that the bounds meet.
+  template <class Function>
+  void for_each_row(const Bounds<D>& range, Function&& f) const {
+    std::array<int, D> low, high, at;
+    for (int a = 0; a < D; ++a) {
+      low[a] = boxes_.box(a, range.low[a]);
+      high[a] = boxes_.box(a, range.high[a]);
+    }
+    low[0] = std::max(low[0] - slab_.first_slice, 0);
+    high[0] = std::min(high[0], slab_.last_slice) - slab_.first_slice;
+    if (low[0] > high[0]) return;
+    at = low;
+    while (true) {
+      std::int64_t row = 0;
+      for (int a = 0; a < D - 1; ++a) row = (row + at[a]) * boxes_.size(a + 1);
+      // In one dimension the slices are the row's own axis.
+      const Index begin = first_[row + low[D - 1]], end = first_[row + high[D - 1] + 1];
+      if (begin < end) f(begin, end);
+      int a = D - 2;
+      while (a >= 0 && at[a] == high[a]) at[a] = low[a], --a;
+      if (a < 0) return;
+      ++at[a];
+    }
+  }
+
+  // Writes what was found to the caller's places. Coordinates and margins are gone after that.
+  void write(CellLocations& result) const {
+    for (Index i = 0; i < num_listed_; ++i) {
+      prefetch(result.local, i);
+      const Index p = caller(i), place = place_[i];
+      const bool found = place >= 0 && cell[place] >= 0;
+      result.cells[p] = found ? cell[place] : -1;
+      for (int a = 0; a < D; ++a) result.local(p, a) = found ? xi[place][a] : 0;
+    }
+  }
+  void forget_positions() {
+    for (auto& axis : x) axis.reset();
+    margin.reset();
+  }
+
+  std::array<LargeArray<double>, D> x;  // sorted coordinates, and max_lanes unused
+  LargeArray<double> margin;            // greatest so far, and max_lanes unused
+  LargeArray<Index> cell;               // of that margin; −1: none yet
+  LargeArray<Coordinates<D>> xi;        // in that cell
+
+ private:
+  Index caller(Index listed) const { return slab_.is_whole() ? listed : slab_.points[listed]; }
+
+  // A slab's points are here and there among the caller's: each would miss the cache.
+  void prefetch(const Points& rows, Index listed) const {
+    constexpr Index ahead = 24;
+    if (!slab_.is_whole()) __builtin_prefetch(rows.data() + caller(std::min(listed + ahead, num_listed_ - 1)) * D);
+  }
+
+  const Boxes<D>& boxes_;
+  const Slab& slab_;
+  Index num_listed_;          // points of the slab, or all of the caller's
+  LargeArray<Index> place_;   // of each in the sorted arrays; −1 outside the boxes
+  std::vector<Index> first_;  // #boxes of the slab + 1
+};
+
+template <int D>
+SlabPoints<D>::SlabPoints(const Points& points, const Boxes<D>& boxes, const Slab& slab)
+    : xi(large_array<Coordinates<D>>(slab.num_points)),
+      boxes_(boxes),
+      slab_(slab),
+      num_listed_(slab.is_whole() ? static_cast<Index>(points.rows()) : slab.num_points),
+      place_(large_array<Index>(num_listed_)) {
+  const std::int64_t num_boxes = (slab.last_slice + 1 - slab.first_slice) * boxes.boxes_a_slice();
   first_.assign(static_cast<std::size_t>(num_boxes) + 1, 0);
-  for (Index p = 0; p < count; ++p) {
-    if (place[p] < 0) continue;
-    std::int64_t index = 0;
-    for (int a = 0; a < D; ++a) index = index * size_[a] + box(a, coordinates(p, a));
-    place[p] = static_cast<Index>(index);
+  // A point's box and position; the place of ξ is free for it yet.
+  Index count = 0;
+  for (Index i = 0; i < num_listed_; ++i) {
+    prefetch(points, i);
+    const Coordinates<D> position = points.row(caller(i)).template head<D>().transpose();
+    place_[i] = -1;
+    if (slab.is_whole() && !boxes.contains(position)) continue;
+    std::int64_t index = boxes.box(0, position[0]) - slab.first_slice;
+    for (int a = 1; a < D; ++a) index = index * boxes.size(a) + boxes.box(a, position[a]);
+    place_[i] = static_cast<Index>(index);
     ++first_[index + 1];
+    xi[count++] = position;
   }
   std::partial_sum(first_.begin(), first_.end(), first_.begin());
   // Rows are tested several points at a time and read beyond their ends.
-  for (auto& axis : x) axis.resize(num_kept + max_lanes);
-  margin.assign(num_kept + max_lanes, -infinity);
-  cell.assign(num_kept, -1);
-  xi.resize(num_kept);
-  for (Index p = 0; p < count; ++p) {
-    if (place[p] < 0) continue;
-    place[p] = first_[place[p]]++;
-    for (int a = 0; a < D; ++a) x[a][place[p]] = coordinates(p, a);
+  for (auto& axis : x) {
+    axis = large_array<double>(count + max_lanes);
+    std::fill_n(axis.get() + count, max_lanes, 0.0);
+  }
+  for (Index i = 0, kept = 0; i < num_listed_; ++i) {
+    if (place_[i] < 0) continue;
+    place_[i] = first_[place_[i]]++;
+    for (int a = 0; a < D; ++a) x[a][place_[i]] = xi[kept][a];
+    ++kept;
   }
   // The insertion advanced every box to the start of the next one.
   std::move_backward(first_.begin(), first_.end() - 1, first_.end());
   first_[0] = 0;
+  margin = large_array<double>(count + max_lanes);
+  std::fill_n(margin.get(), count + max_lanes, -infinity);
+  cell = large_array<Index>(count);
+  std::fill_n(cell.get(), count, -1);
 }
 
 // The planes of an affine cell.
@@ -279,17 +346,17 @@ struct ClaimBuffers {
   std::vector<Index> claimed;
 };
 
-// Tests one cell against the points of its rows, in the slices of the grid from first_slice to last_slice. A claim sets
-// ξ at once, while the cell's map is at hand: few points are claimed more than once.
+// Tests one cell against the points of its rows. A claim sets ξ at once, while the cell's map is at hand: few points
+// are claimed more than once.
 template <Element E>
 void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Index cell, double tolerance,
-           PointGrid<E::dim>& grid, int first_slice, int last_slice, ClaimBuffers& buffers) {
+           SlabPoints<E::dim>& points, ClaimBuffers& buffers) {
   const Bounds<E::dim> bounds = cell_bounds(mesh, block, row, tolerance);
-  if (!grid.meets(bounds)) return;
+  if (!points.meets(bounds)) return;
   if constexpr (E::affine) {
     buffers.rows.clear();
     Index num_points = 0;
-    grid.for_each_row(bounds, first_slice, last_slice, [&](Index begin, Index end) {
+    points.for_each_row(bounds, [&](Index begin, Index end) {
       buffers.rows.push_back({begin, end});
       num_points += end - begin;
     });
@@ -297,19 +364,19 @@ void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Ind
     const AffineCell<E> affine(node_positions(mesh, block, row), tolerance);
     if (affine.map.degenerate()) return;
     if (static_cast<Index>(buffers.claimed.size()) < num_points) buffers.claimed.resize(num_points);
-    PlaneTest<E::dim> test{affine.planes, affine.least, {}, grid.margin.data()};
-    for (int a = 0; a < E::dim; ++a) test.x[a] = grid.x[a].data();
+    PlaneTest<E::dim> test{affine.planes, affine.least, {}, points.margin.get()};
+    for (int a = 0; a < E::dim; ++a) test.x[a] = points.x[a].get();
     const Index num_claimed = raise_margins(test, buffers.rows, buffers.claimed.data());
     for (Index i = 0; i < num_claimed; ++i) {
       const Index p = buffers.claimed[i];
-      grid.cell[p] = cell;
-      grid.xi[p] = affine.xi(grid.position(p));
+      points.cell[p] = cell;
+      points.xi[p] = affine.xi(points.position(p));
     }
   } else {
     std::optional<InverseMap<E>> map;
-    grid.for_each_row(bounds, first_slice, last_slice, [&](Index begin, Index end) {
+    points.for_each_row(bounds, [&](Index begin, Index end) {
       for (Index p = begin; p < end; ++p) {
-        const Coordinates<E::dim> position = grid.position(p);
+        const Coordinates<E::dim> position = points.position(p);
         if (!bounds.contains(position)) continue;
         if (!map) map.emplace(node_positions(mesh, block, row));
         if (map->degenerate()) return;
@@ -317,81 +384,118 @@ void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Ind
         const InverseMapResult<E> result = (*map)(position);
         if (!result.converged) continue;
         const double margin = E::margin(result.xi);
-        if (margin < -tolerance || margin <= grid.margin[p]) continue;
-        grid.margin[p] = margin;
-        grid.cell[p] = cell;
-        grid.xi[p] = result.xi;
+        if (margin < -tolerance || margin <= points.margin[p]) continue;
+        points.margin[p] = margin;
+        points.cell[p] = cell;
+        points.xi[p] = result.xi;
       }
     });
   }
 }
 
-// A contiguous range of slices, and the cells of each block that meet it, ascending, as rows of the block; no lists
-// where one slab has all cells.
-struct Slab {
-  int first_slice, last_slice;
-  std::vector<std::vector<Index>> rows;
-};
-
-// Cuts the grid into slabs for threads. Each gets its own list of cells, so that no thread reads cells it does not
-// need.
+// Cuts the boxes into slabs of about equal numbers of points: several for each thread where there are threads, and none
+// much larger than max_slab_points. `members` takes the points, slab by slab.
 template <int D>
-std::vector<Slab> make_slabs(const Mesh& mesh, const PointGrid<D>& grid, double tolerance) {
-  const int num_slices = grid.size(0);
-  const int num_slabs = D == 1 || num_threads() == 1 ? 1 : std::min(num_slices, 4 * num_threads());
-  std::vector<Slab> slabs(num_slabs);
-  std::vector<int> slab_of(num_slices);
-  for (int s = 0; s < num_slabs; ++s) {
-    slabs[s].first_slice = static_cast<int>(static_cast<std::int64_t>(s) * num_slices / num_slabs);
-    slabs[s].last_slice = static_cast<int>(static_cast<std::int64_t>(s + 1) * num_slices / num_slabs) - 1;
-    for (int slice = slabs[s].first_slice; slice <= slabs[s].last_slice; ++slice) slab_of[slice] = s;
+std::vector<Slab> make_slabs(const Points& points, const Boxes<D>& boxes, Index num_points,
+                             LargeArray<Index>& members) {
+  constexpr Index max_slab_points = 1 << 20;
+  const int num_slices = boxes.size(0);
+  const Index num_wanted = std::max(num_threads() == 1 ? 1 : 4 * num_threads(), (num_points - 1) / max_slab_points + 1);
+  if (num_wanted == 1 || num_slices == 1) return {{0, num_slices - 1, nullptr, num_points, {}}};
+  const auto all = static_cast<Index>(points.rows());
+  const LargeArray<int> slice_of = large_array<int>(all);
+  std::vector<Index> count(num_slices, 0);
+  for (Index p = 0; p < all; ++p) {
+    const Coordinates<D> position = points.row(p).template head<D>().transpose();
+    slice_of[p] = boxes.contains(position) ? boxes.box(0, position[0]) : -1;
+    if (slice_of[p] >= 0) ++count[slice_of[p]];
   }
-  if (num_slabs == 1) return slabs;
+  std::vector<Slab> slabs;
+  std::vector<std::size_t> slab_of(num_slices);
+  std::vector<Index> next;  // of each slab: where its next point goes
+  Index before = 0;
+  members = large_array<Index>(num_points);
+  for (int slice = 0; slice < num_slices; ++slice) {
+    const auto share = static_cast<std::int64_t>(slabs.size()) * num_points / num_wanted;
+    if (slabs.empty() || (before >= share && before < num_points)) {
+      slabs.push_back({slice, slice, members.get() + before, 0, {}});
+      next.push_back(before);
+    }
+    slabs.back().last_slice = slice;
+    slabs.back().num_points += count[slice];
+    slab_of[slice] = slabs.size() - 1;
+    before += count[slice];
+  }
+  for (Index p = 0; p < all; ++p)
+    if (slice_of[p] >= 0) members[next[slab_of[slice_of[p]]]++] = p;
+  return slabs;
+}
+
+// Gives each slab its own list of cells, so that none reads cells it does not need.
+template <int D>
+void list_cells(const Mesh& mesh, const Boxes<D>& boxes, double tolerance, std::vector<Slab>& slabs) {
+  std::vector<std::size_t> slab_of;
+  for (std::size_t s = 0; s < slabs.size(); ++s) slab_of.resize(slabs[s].last_slice + 1, s);
   for_each_block_of_dim<D>(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
     for (Slab& slab : slabs) slab.rows.emplace_back();
     for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
       const Bounds<D> bounds = cell_bounds(mesh, block, c, tolerance);
-      if (!grid.meets(bounds)) continue;
-      const int last = slab_of[grid.box(0, bounds.high[0])];
-      for (int s = slab_of[grid.box(0, bounds.low[0])]; s <= last; ++s)
+      if (!boxes.meets(bounds)) continue;
+      const std::size_t last = slab_of[boxes.box(0, bounds.high[0])];
+      for (std::size_t s = slab_of[boxes.box(0, bounds.low[0])]; s <= last; ++s)
         slabs[s].rows.back().push_back(static_cast<Index>(c));
     }
   });
-  return slabs;
 }
 
 template <int D>
 CellLocations locate_in(const Mesh& mesh, const Points& points, double tolerance) {
-  const Index count = static_cast<Index>(points.rows());
-  PointGrid<D> grid(points, cell_statistics<D>(mesh, tolerance), mesh.num_cells());
+  const CellStatistics<D> cells = cell_statistics<D>(mesh, tolerance);
+  const auto coordinates = points.template leftCols<D>();
+  Bounds<D> bounds;
+  Index num_points = 0;
+  for (Index p = 0; p < static_cast<Index>(points.rows()); ++p) {
+    const Coordinates<D> position = coordinates.row(p).transpose();
+    if (!cells.bounds.contains(position)) continue;
+    bounds.include(position);
+    ++num_points;
+  }
+  const Boxes<D> boxes(bounds, num_points, cells, mesh.num_cells());
+  LargeArray<Index> members;
+  std::vector<Slab> slabs = make_slabs<D>(points, boxes, num_points, members);
+  const bool whole = slabs[0].is_whole();
+  if (!whole) list_cells<D>(mesh, boxes, tolerance, slabs);
 
+  CellLocations result;
+  const auto make_result = [&] {
+    reserve_large(result.cells, points.rows());
+    result.cells.assign(points.rows(), -1);
+    result.local.resize(points.rows(), D);
+    use_large_pages(result.local.data(), result.local.size() * sizeof(double));
+  };
+  if (!whole) {
+    make_result();
+    if (num_points < points.rows()) result.local.setZero();
+  }
   // Slabs own their points, so that threads share nothing. Every slab sees the cells in ascending order: a later cell
-  // wins by a greater margin only, which leaves ties to the lowest number. In one dimension the only axis is the rows'.
-  const std::vector<Slab> slabs = make_slabs<D>(mesh, grid, tolerance);
+  // wins by a greater margin only, which leaves ties to the lowest number.
   parallel_for(static_cast<std::int64_t>(slabs.size()), 1, [&](std::int64_t begin, std::int64_t end) {
     ClaimBuffers buffers;
     for (std::int64_t s = begin; s < end; ++s) {
+      SlabPoints<D> slab_points(points, boxes, slabs[s]);
       std::size_t b = 0;
       for_each_block_of_dim<D>(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
-        const bool whole = slabs.size() == 1;
         const Index num_rows =
             whole ? static_cast<Index>(block.cells.rows()) : static_cast<Index>(slabs[s].rows[b].size());
         for (Index i = 0; i < num_rows; ++i) {
           const Index row = whole ? i : slabs[s].rows[b][i];
-          claim<E>(mesh, block, row, first + row, tolerance, grid, slabs[s].first_slice, slabs[s].last_slice, buffers);
+          claim<E>(mesh, block, row, first + row, tolerance, slab_points, buffers);
         }
         ++b;
       });
-    }
-  });
-  for (auto& axis : grid.x) std::vector<double>().swap(axis);
-  std::vector<double>().swap(grid.margin);
-  CellLocations result{std::vector<Index>(count, -1), Points(count, D)};
-  parallel_for(count, 65536, [&](std::int64_t begin, std::int64_t end) {
-    for (auto p = static_cast<Index>(begin); p < end; ++p) {
-      const Index place = grid.place[p];
-      if (place >= 0) result.cells[p] = grid.cell[place];
-      for (int a = 0; a < D; ++a) result.local(p, a) = result.cells[p] >= 0 ? grid.xi[place][a] : 0;
+      slab_points.forget_positions();
+      if (whole) make_result();  // not before: that would be the most memory at a time
+      slab_points.write(result);
     }
   });
   return result;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "framework/kernels/cell_polynomial.hpp"
+#include "framework/large_array.hpp"
 
 namespace halfgrad {
 
@@ -29,8 +30,7 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Edge& edge) {
   constexpr int num_edges = kernels::num_edges(dim);
   // Open addressing; a slot of an earlier window counts as empty. Twice the edges that a window can have, or more.
   struct Slot {
-    std::array<Index, 2> ends;
-    Index edge = -1;
+    Index low, high, edge = -1;
   };
   constexpr unsigned bits = 11;
   static_assert((1 << bits) >= 2 * num_edges * kernels::window_size);
@@ -39,6 +39,9 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Edge& edge) {
   EdgeWindows<Scalar> result;
   result.of_run.reserve(nodes.size() * num_edges);
   result.reversed.reserve(nodes.size());
+  // Room for edges that no two runs share; what is not used is never touched.
+  reserve_large(result.ends, nodes.size() * num_edges);
+  reserve_large(result.vectors, nodes.size() * num_edges * dim + kernels::vector_padding);
   for (Index run = 0; run < num_runs; ++run) {
     const auto num_before = static_cast<Index>(result.ends.size());
     if (run % kernels::window_size == 0) result.first.push_back(num_before);
@@ -47,13 +50,13 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Edge& edge) {
     for (int i = 0; i < dim; ++i)
       for (int j = i + 1; j <= dim; ++j) {
         const auto [low, high] = std::minmax(nodes[run][i], nodes[run][j]);
-        const std::array<Index, 2> ends{low, high};
         std::uint64_t at =
             (static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint32_t>(high)) * 0x9e3779b97f4a7c15ull >>
             (64 - bits);
-        while (slots[at].edge >= window_begin && slots[at].ends != ends) at = (at + 1) & (slots.size() - 1);
+        while (slots[at].edge >= window_begin && (slots[at].low != low || slots[at].high != high))
+          at = (at + 1) & (slots.size() - 1);
         if (slots[at].edge < window_begin) {
-          slots[at] = {ends, static_cast<Index>(result.ends.size())};
+          slots[at] = {low, high, static_cast<Index>(result.ends.size())};
           result.ends.push_back({nodes[run][i], nodes[run][j]});
           const Vector vector = edge(run, i, j);
           for (int k = 0; k < dim; ++k) result.vectors.push_back(static_cast<Scalar>(vector[k]));

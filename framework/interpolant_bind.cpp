@@ -88,6 +88,7 @@ CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
     order.first_point.push_back(begin + count[each.cell]);
     count[each.cell] = begin;  // now where the cell's next point goes
   }
+  reserve_large(order.points, static_cast<std::size_t>(order.first_point.back()));
   order.points.resize(static_cast<std::size_t>(order.first_point.back()));
   for (Index p = 0; p < embedding.num_points(); ++p)
     if (embedding.cells[p] >= 0) order.points[count[embedding.cells[p]]++] = p;
@@ -125,6 +126,7 @@ namespace {
 std::vector<Index> inverse_unless_identity(const std::vector<Index>& permutation) {
   std::vector<Index> inverse;
   if (std::is_sorted(permutation.begin(), permutation.end())) return inverse;
+  reserve_large(inverse, permutation.size());
   inverse.resize(permutation.size());
   for (std::size_t s = 0; s < permutation.size(); ++s) inverse[permutation[s]] = static_cast<Index>(s);
   return inverse;
@@ -177,12 +179,15 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
   using E = typename Runs::element;
   constexpr int n = E::num_nodes, d = E::dim;
   const auto num_runs = members.size();
+  reserve_large(runs.nodes, num_runs);
+  reserve_large(runs.rest, num_runs + 1);
   runs.nodes.resize(num_runs);
   runs.rest.resize(num_runs + 1);
   runs.first.resize(num_runs + 1);
   for (std::size_t r = 0; r < num_runs; ++r)
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
   const auto num_points = static_cast<std::size_t>(runs.first.back());
+  reserve_large(runs.local, num_points * d + kernels::vector_padding);
   runs.local.assign(num_points * d + kernels::vector_padding, Scalar(0));
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
@@ -242,7 +247,10 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
     if (r < 0) raise("no gradient stencil for vertex {}: reconstruct every active vertex", vertices[v]);
     stencils.first_group[v + 1] = stencils.first_group[v] + (table.offsets[r + 1] - table.offsets[r] + 3) / 4;
   }
-  stencils.neighbors.resize(static_cast<std::size_t>(4 * stencils.first_group.back()));
+  const auto num_entries = static_cast<std::size_t>(4 * stencils.first_group.back());
+  reserve_large(stencils.neighbors, num_entries);
+  reserve_large(stencils.weights, num_entries * static_cast<std::size_t>(width));
+  stencils.neighbors.resize(num_entries);
   stencils.weights.assign(stencils.neighbors.size() * static_cast<std::size_t>(width), Scalar(0));
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
@@ -369,6 +377,7 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
   }
 
   const std::vector<Index> outside_row = outside_rows(embedding);
+  reserve_large(binding->permutation, embedding.cells.size());
   binding->permutation.resize(embedding.cells.size());
   Index base = 0;
   Elements::for_each([&]<class E>() {

@@ -35,14 +35,20 @@ template <int D>
 void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
   using Direction = Eigen::Matrix<double, D, 1>;
   using Square = Eigen::Matrix<double, D, D>;
-  Square normal = epsilon * Square::Identity();
+  // The upper triangle in numbers of its own: as a matrix it would go through memory for every cell.
+  double upper[D][D] = {};
+  for (int a = 0; a < D; ++a) upper[a][a] = epsilon;
   Direction sum = Direction::Zero();
   for (const Vector& offset : star.offsets) {
     star.weights.push_back(1 / offset.template head<D>().norm());
     const Direction direction = offset.template head<D>() * star.weights.back();
-    normal += direction * direction.transpose();
+    for (int a = 0; a < D; ++a)
+      for (int b = a; b < D; ++b) upper[a][b] += direction[a] * direction[b];
     sum += direction;
   }
+  Square normal;
+  for (int a = 0; a < D; ++a)
+    for (int b = 0; b < D; ++b) normal(a, b) = upper[std::min(a, b)][std::max(a, b)];
   // The trace of the inverse is between one and D times that of the least eigenvalue.
   const Square inverse = normal.inverse();
   const double least = 1 / inverse.trace();
@@ -93,21 +99,24 @@ void CellStar::add(Index vertex, Index cell) {
   Index& place = places_.of(cell);
   if (place < 0) {
     place = static_cast<Index>(known_.size());
-    known_.push_back(geometry_->gradient(cell));
+    const CellGradient gradient = geometry_->gradient(cell);
+    known_.push_back(gradient.volume);
+    known_.insert(known_.end(), gradient.centroid.begin(), gradient.centroid.end());
+    known_.insert(known_.end(), gradient.weights.data(), gradient.weights.data() + gradient.weights.size());
   }
-  const CellGradient& gradient = known_[place];
-  if (!(gradient.volume > 0)) return;
+  const double volume = known_[place], *const centroid = &known_[place] + 1;
+  if (!(volume > 0)) return;
   cells.push_back(cell);
   members_.push_back(place);
-  volumes.push_back(gradient.volume);
+  volumes.push_back(volume);
   const Points& vertices = geometry_->vertices();
   Vector& offset = offsets.emplace_back(vertices.cols());
-  for (Eigen::Index a = 0; a < vertices.cols(); ++a) offset[a] = gradient.centroid[a] - vertices(vertex, a);
+  for (Eigen::Index a = 0; a < vertices.cols(); ++a) offset[a] = centroid[a] - vertices(vertex, a);
 }
 
-std::span<const CellGradient* const> CellStar::gradients() {
+std::span<const double* const> CellStar::gradients() {
   gradients_.clear();
-  for (const Index member : members_) gradients_.push_back(&known_[member]);
+  for (const Index member : members_) gradients_.push_back(&known_[member] + 1 + geometry_->gdim());
   return gradients_;
 }
 

@@ -27,17 +27,17 @@ class CellStar {
   void clear();
   /// Adds a cell, seen from the vertex, unless it is degenerate.
   void add(Index vertex, Index cell);
-  /// The gradients of the cells, valid until cells are added.
-  std::span<const CellGradient* const> gradients();
+  /// The gradient stencils of the cells, #nodes × gdim each, valid until cells are added.
+  std::span<const double* const> gradients();
 
  private:
-  static constexpr std::size_t max_known = 4096;  // some 1.3 MB
+  static constexpr std::size_t max_known = 160'000;  // 1.3 MB, 10,000 tetrahedra
 
   const CellGradients* geometry_;
-  std::vector<CellGradient> known_;
-  Places places_;               // of cells in known_
-  std::vector<Index> members_;  // of known_, one a cell
-  std::vector<const CellGradient*> gradients_;
+  std::vector<double> known_;   // volume, centroid, gradient stencil of one cell after the other
+  Places places_;               // where a cell's begin
+  std::vector<Index> members_;  // the same, one a cell of the star
+  std::vector<const double*> gradients_;
 };
 
 /// A reconstructor of the form F_v = Σ_k w'_k F_k. Derived classes choose and weigh the cells; composition with the

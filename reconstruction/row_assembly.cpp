@@ -4,8 +4,8 @@
 #include <mutex>
 #include <utility>
 
+#include "framework/large_array.hpp"
 #include "framework/parallel.hpp"
-#include "reconstruction/places.hpp"
 
 namespace halfgrad {
 
@@ -80,8 +80,8 @@ void reserve_for(std::int64_t num_rows, std::int64_t num_made, GradientStencilTa
   if (num_made >= num_rows) return;
   const double growth = 2 * static_cast<double>(num_rows) / static_cast<double>(num_made);
   for (auto* weights : {&table.weights, &table.hessian_weights})
-    weights->reserve(static_cast<std::size_t>(growth * static_cast<double>(weights->size())));
-  table.neighbors.reserve(static_cast<std::size_t>(growth * static_cast<double>(table.neighbors.size())));
+    reserve_large(*weights, static_cast<std::size_t>(growth * static_cast<double>(weights->size())));
+  reserve_large(table.neighbors, static_cast<std::size_t>(growth * static_cast<double>(table.neighbors.size())));
 }
 
 }  // namespace
@@ -121,48 +121,59 @@ GradientStencilTable assemble_rows_with_workers(int gdim, std::span<const Index>
   return table;
 }
 
-void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
-                 std::span<const CellGradient* const> gradients, std::span<const double> cell_weights,
-                 StencilRow& row) {
-  const auto gdim = static_cast<std::size_t>(cells.gdim());
-  // Neighbours as they are met, and their sums; sorted at the end.
-  Places places(32);
-  std::vector<std::pair<Index, Index>> met;
-  std::vector<double> sums;
-  met.reserve(32);
-  sums.reserve(32 * gdim);
+namespace {
+
+template <int D>
+void compose(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
+             std::span<const double* const> gradients, std::span<const double> cell_weights, StencilRow& row) {
+  // Neighbours as they are met, and their sums; sorted at the end. A key is a neighbour's number and its place.
+  row.places.clear();
+  row.keys.clear();
+  row.sums.clear();
   for (std::size_t k = 0; k < cell_numbers.size(); ++k) {
-    const double* weight = gradients[k]->weights.data();
+    const double* weight = gradients[k];
     for (const Index v : cells.vertices_of(cell_numbers[k])) {
       if (v != vertex) {
-        Index& place = places.of(v);
+        Index& place = row.places.of(v);
         if (place < 0) {
-          place = static_cast<Index>(met.size());
-          met.emplace_back(v, place);
-          sums.resize(sums.size() + gdim, 0.0);
+          place = static_cast<Index>(row.keys.size());
+          row.keys.push_back(static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(place));
+          row.sums.resize(row.sums.size() + D, 0.0);
         }
-        double* sum = sums.data() + static_cast<std::size_t>(place) * gdim;
-        for (std::size_t a = 0; a < gdim; ++a) sum[a] += cell_weights[k] * weight[a];
+        double* sum = row.sums.data() + static_cast<std::size_t>(place) * D;
+        for (int a = 0; a < D; ++a) sum[a] += cell_weights[k] * weight[a];
       }
-      weight += gdim;
+      weight += D;
     }
   }
-  std::sort(met.begin(), met.end());
-  row.neighbors.resize(met.size());
-  row.weights.resize(met.size() * gdim);
-  for (std::size_t n = 0; n < met.size(); ++n) {
-    row.neighbors[n] = met[n].first;
-    const auto place = static_cast<std::size_t>(met[n].second);
-    for (std::size_t a = 0; a < gdim; ++a) row.weights[n * gdim + a] = sums[place * gdim + a];
+  std::sort(row.keys.begin(), row.keys.end());
+  row.neighbors.resize(row.keys.size());
+  row.weights.resize(row.keys.size() * D);
+  for (std::size_t n = 0; n < row.keys.size(); ++n) {
+    row.neighbors[n] = static_cast<Index>(row.keys[n] >> 32);
+    const double* sum = row.sums.data() + static_cast<std::uint32_t>(row.keys[n]) * D;
+    for (int a = 0; a < D; ++a) row.weights[n * D + static_cast<std::size_t>(a)] = sum[a];
   }
+}
+
+}  // namespace
+
+void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
+                 std::span<const double* const> gradients, std::span<const double> cell_weights,
+                 StencilRow& row) {
+  static_assert(max_gdim == 4);
+  if (cells.gdim() == 1) return compose<1>(cells, vertex, cell_numbers, gradients, cell_weights, row);
+  if (cells.gdim() == 2) return compose<2>(cells, vertex, cell_numbers, gradients, cell_weights, row);
+  if (cells.gdim() == 3) return compose<3>(cells, vertex, cell_numbers, gradients, cell_weights, row);
+  compose<4>(cells, vertex, cell_numbers, gradients, cell_weights, row);
 }
 
 void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
                  std::span<const double> cell_weights, StencilRow& row) {
   std::vector<CellGradient> gradients;
-  std::vector<const CellGradient*> pointers;
+  std::vector<const double*> pointers;
   for (const Index cell : cell_numbers) gradients.push_back(cells.gradient(cell));
-  for (const CellGradient& gradient : gradients) pointers.push_back(&gradient);
+  for (const CellGradient& gradient : gradients) pointers.push_back(gradient.weights.data());
   compose_row(cells, vertex, cell_numbers, pointers, cell_weights, row);
 }
 

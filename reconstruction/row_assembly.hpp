@@ -7,6 +7,7 @@
 
 #include "framework/cell_gradients.hpp"
 #include "framework/gradient_stencils.hpp"
+#include "reconstruction/places.hpp"
 
 namespace halfgrad {
 
@@ -16,6 +17,10 @@ struct StencilRow {
   std::vector<double> weights;          ///< gdim an entry
   std::vector<double> hessian_weights;  ///< none, or num_symmetric(gdim) an entry
   StencilDiagnostics diagnostics;
+
+  Places places{32};  ///< of compose_row, kept from row to row
+  std::vector<std::uint64_t> keys;
+  std::vector<double> sums;
 
   void clear();
 };
@@ -37,8 +42,8 @@ GradientStencilTable assemble_rows_with_workers(int gdim, std::span<const Index>
 void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
                  std::span<const double> cell_weights, StencilRow& row);
 
-/// The same where the cells' gradients are at hand.
+/// The same where the cells' gradient stencils (#nodes × gdim, row-major) are at hand.
 void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
-                 std::span<const CellGradient* const> gradients, std::span<const double> cell_weights, StencilRow& row);
+                 std::span<const double* const> gradients, std::span<const double> cell_weights, StencilRow& row);
 
 }  // namespace halfgrad
