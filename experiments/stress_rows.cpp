@@ -31,9 +31,12 @@ StressReconstructor made(const json& specification) {
     if (from.name == "kriging") result.accepted_sum = cubic ? 40 : 20;
   } else if (from.name == "ppr") {
     // Two pseudo-inverses in a row, each of singular values down to 1e-3 of the largest.
-    result.residual_condition = result.forward_condition = 1e6;
+    result.residual_condition = 1e6;
+    result.forward_condition = 1e12;
   } else if (from.name == "spr") {
-    result.residual_condition = result.forward_condition = 1e3;
+    // ε |A| |A⁺|² is how A⁺ rounds, and weights may be as small as 1 / |A|.
+    result.residual_condition = 1e3;
+    result.forward_condition = 1e6;
   }
   result.grids_only = from.name == "centered_difference";
   result.blended_in = result.name == "chandrashekar_garg" || result.name == "kriging" || result.name == "kriging lean";
