@@ -313,7 +313,9 @@ void CaseRunner::check_rule(std::size_t rule_number, const Rows* rows) {
     for (Index p = 0; p < num_points; ++p) {
       if (points_.embedding.status[p] != PointStatus::inside) continue;
       long double squared = 0, magnitude = 0;
+      // In a sliver far from the origin the last place of a position may lie beyond the cell.
       bool held = true;
+      for (int i = 0; i < weights_[p].num_nodes; ++i) held &= weights_[p].beta[i].value >= -1e-9L;
       for (int c = 0; c < columns; ++c) {
         squared += std::pow(static_cast<long double>(rough(p, c)) - found(p, c), 2);
         magnitude += reference[p][c].magnitude;

@@ -97,16 +97,18 @@ class KrigingRow {
 
  private:
   // The local unit of length and the coordinates in which patches are chosen and fitted: y = T (X − X_v). False where
-  // the vertex has no neighbour at a distance; those in the same place tell nothing of lengths.
+  // the vertex has no neighbour at a distance; those in the same place, but for rounding, tell nothing of lengths.
   bool find_metric(Index vertex) {
     const int gdim = cells_->gdim();
     const auto origin = cells_->vertices().row(vertex);
     const std::span<const Index> near = rings_.within(2);
     distances_.clear();
+    double farthest = 0;
     for (Index v : near) {
-      const double squared_distance = (cells_->vertices().row(v) - origin).squaredNorm();
-      if (squared_distance > 0) distances_.push_back(squared_distance);
+      distances_.push_back((cells_->vertices().row(v) - origin).squaredNorm());
+      farthest = std::max(farthest, distances_.back());
     }
+    std::erase_if(distances_, [farthest](double squared) { return !(squared > 1e-24 * farthest); });
     const std::size_t count = std::min<std::size_t>(2 * gdim, distances_.size());
     if (count == 0) return false;
     std::nth_element(distances_.begin(), distances_.begin() + (count - 1), distances_.end());
