@@ -160,7 +160,8 @@ void restore_affine(const Eigen::Ref<const MatrixXd>& edges, Eigen::Ref<MatrixXd
                     Eigen::Ref<MatrixXd> hessian) {
   constexpr double negligible = 1e-14;
   const Eigen::Index dim = edges.rows();
-  double before = 1;
+  // Across a needle the residual may have large entries, and yet its square is small.
+  double before = std::numeric_limits<double>::infinity();
   for (int pass = 0; pass < 3; ++pass) {
     const SmallSquare residual = SmallSquare::Identity(dim, dim) - gradient.lazyProduct(edges.transpose());
     const double size = residual.cwiseAbs().maxCoeff();
