@@ -40,6 +40,7 @@ void CaseRunner::measure_cells() {
       steepest = std::max(steepest, gradient.weights.row(static_cast<Eigen::Index>(i)).norm());
     }
     aspect_ = std::max(aspect_, longest * steepest);
+    steepest_cell_ = std::max(steepest_cell_, steepest);
   }
 }
 
@@ -175,6 +176,10 @@ Rows CaseRunner::make_rows(const StressReconstructor& made) {
         rows.steepest = std::isfinite(weight) ? std::max(rows.steepest, std::abs(weight)) : infinity;
   };
   measure(table);
+  if (rows.blended()) {
+    measure(rows.reconstruction.blend->averaging);
+    measure(rows.reconstruction.blend->probing);
+  }
   rows.noise = reference_gradients(table, {}, noise_);
   rows.affine = reference_gradients(table, rows.magnitudes, affine_);
   if (rows.blended())
@@ -285,7 +290,7 @@ std::span<const StressPropertyEntry> stress_properties() {
       {"smooth", "the error is at most half the greatest second derivative times sum |S_j| |X_j - X|^2"},
       {"bad_vertex", "NaN or infinity at a vertex changes no bit of points whose cells and stencils do not read it"},
       {"renumbered", "another numbering changes nothing beyond N eps c' M"},
-      {"turned", "axes permuted and reversed change nothing beyond N eps c' M"},
+      {"turned", "turned axes change nothing beyond N eps c' M"},
       {"scaled", "a power of two as scale changes nothing beyond N eps c' M"},
   }};
   return entries;

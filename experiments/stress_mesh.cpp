@@ -90,14 +90,6 @@ Vector random_direction(RandomStream& random, int dim) {
   return direction.normalized();
 }
 
-// Orthogonal, of either sign.
-SmallMatrix random_rotation(RandomStream& random, int dim) {
-  Eigen::MatrixXd matrix(dim, dim);
-  for (int a = 0; a < dim; ++a)
-    for (int b = 0; b < dim; ++b) matrix(a, b) = random.uniform(-1, 1);
-  return Eigen::MatrixXd(Eigen::HouseholderQR<Eigen::MatrixXd>(matrix).householderQ());
-}
-
 // Shapes.
 
 Draft lattice(std::string_view element, RandomStream& random) {
@@ -370,6 +362,13 @@ std::vector<std::string_view> stress_elements() {
   Elements::for_each([&]<class E>() { names.push_back(E::name); });
   names.push_back("mixed");
   return names;
+}
+
+SmallMatrix random_rotation(RandomStream& random, int dim) {
+  Eigen::MatrixXd matrix(dim, dim);
+  for (int a = 0; a < dim; ++a)
+    for (int b = 0; b < dim; ++b) matrix(a, b) = random.uniform(-1, 1);
+  return Eigen::MatrixXd(Eigen::HouseholderQR<Eigen::MatrixXd>(matrix).householderQ());
 }
 
 StressMesh make_stress_mesh(std::string_view element, std::uint64_t seed) {

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "experiments/random.hpp"
 #include "framework/mesh.hpp"
 
 namespace halfgrad {
@@ -26,5 +27,8 @@ std::vector<std::string_view> stress_elements();
 /// The same seed gives the same mesh, but for the last bits of the machine's powers and sines. Throws Error on an
 /// unknown element.
 StressMesh make_stress_mesh(std::string_view element, std::uint64_t seed);
+
+/// A random orthogonal matrix, of either sign.
+SmallMatrix random_rotation(RandomStream& random, int dim);
 
 }  // namespace halfgrad

@@ -60,6 +60,23 @@ void fill_beta(const Embedding& embedding, Index point, const OutsidePoint* outs
       beta[i] = beta[i] + Measured(gradient(i, k), 1 << E::dim) * Measured(outside->offset[k]);
 }
 
+// On simplices the fast path goes edge by edge: X − X_i = Σ_j β_j (X_j − X_i), with the products of that sum. They are
+// greater than those of X only outside, where weights have both signs.
+template <int d>
+void add_edges(const InterpolationRule& rule, const ReferenceWeights& weights, ReferenceCoefficients& result) {
+  const bool hermite = rule.formula == Formula::hermite;
+  if (rule.formula == Formula::dual_taylor || !rule.needs_gradients()) return;
+  const double alpha = rule.formula == Formula::blend ? rule.alpha : 0.5;
+  for (int i = 0; i < weights.num_nodes; ++i)
+    for (int j = 0; j < weights.num_nodes; ++j) {
+      const long double own = weights.beta[i].magnitude, other = weights.beta[j].magnitude;
+      if (hermite) result.a[i].magnitude += own * other * (own + other);
+      for (int k = 0; k < d; ++k)
+        result.c[i][k].magnitude += alpha * own * other * (hermite ? 1 + own + other : 1) *
+                                    std::abs(weights.rest[j][k].value - weights.rest[i][k].value);
+    }
+}
+
 template <int d>
 ReferenceCoefficients coefficients_in(const InterpolationRule& rule, const ReferenceWeights& weights) {
   std::array<std::array<Measured, d>, max_nodes> rest;
@@ -71,6 +88,7 @@ ReferenceCoefficients coefficients_in(const InterpolationRule& rule, const Refer
     std::copy_n(found.c[i].begin(), d, result.c[i].begin());
     if (rule.needs_hessians()) std::copy_n(found.q[i].begin(), num_symmetric(d), result.q[i].begin());
   }
+  if (weights.is_simplex) add_edges<d>(rule, weights, result);
   return result;
 }
 
@@ -90,6 +108,7 @@ ReferenceWeights reference_weights(const Mesh& mesh, const Embedding& embedding,
   const Index cell = embedding.cells[point];
   with_cell(mesh, cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
     result.num_nodes = E::num_nodes;
+    result.is_simplex = E::affine;
     double largest = 0;
     for (int i = 0; i < E::num_nodes; ++i)
       largest = std::max(largest, mesh.vertices().row(block.cells(row, i)).cwiseAbs().maxCoeff());
@@ -112,7 +131,7 @@ ReferenceCoefficients reference_coefficients(const InterpolationRule& rule, cons
 }
 
 ReferenceGradients reference_gradients(const GradientStencilTable& table, const std::vector<double>& magnitudes,
-                                       const ReferenceValues& values) {
+                                       const ReferenceValues& values, const std::vector<double>& hessian_magnitudes) {
   const int d = table.gdim, sym = num_symmetric(d);
   const auto columns = static_cast<int>(values.values.cols());
   ReferenceGradients result;
@@ -126,13 +145,13 @@ ReferenceGradients reference_gradients(const GradientStencilTable& table, const 
     for (Offset e = table.offsets[r]; e < table.offsets[r + 1]; ++e)
       for (int c = 0; c < columns; ++c) {
         const Measured x = difference(values, table.neighbors[e], v, c);
-        for (int k = 0; k < d; ++k)
-          gradient[c * d + k] = gradient[c * d + k] +
-                                x * (magnitudes.empty() ? Measured(table.weights[e * d + k])
-                                                        : Measured(table.weights[e * d + k], magnitudes[e * d + k]));
+        const auto add = [&](Measured& to, const std::vector<double>& weights, const std::vector<double>& of_weights,
+                             Offset at) {
+          to = to + x * (of_weights.empty() ? Measured(weights[at]) : Measured(weights[at], of_weights[at]));
+        };
+        for (int k = 0; k < d; ++k) add(gradient[c * d + k], table.weights, magnitudes, e * d + k);
         for (int k = 0; k < sym && table.has_hessians(); ++k)
-          result.hessian[v][c * sym + k] =
-              result.hessian[v][c * sym + k] + x * Measured(table.hessian_weights[e * sym + k]);
+          add(result.hessian[v][c * sym + k], table.hessian_weights, hessian_magnitudes, e * sym + k);
       }
   }
   return result;

@@ -36,6 +36,7 @@ struct Measured {
 /// A point of an embedding: its cell's vertices and weights.
 struct ReferenceWeights {
   int num_nodes = 0;
+  bool is_simplex = false;
   std::array<Index, max_nodes> vertices{};
   std::array<Measured, max_nodes> beta{};
   /// X_i − X_0, zero beyond num_nodes. Cells that are no simplices count as affine where rounding of their coordinates
@@ -71,9 +72,10 @@ struct ReferenceGradients {
   std::vector<std::vector<Measured>> gradient, hessian;
 };
 
-/// Applies a table. `magnitudes`, one a weight, are what the weights were computed from; none: the weights are exact.
+/// Applies a table. Magnitudes, one a weight, are what the weights were computed from; none: the weights are exact.
 ReferenceGradients reference_gradients(const GradientStencilTable& table, const std::vector<double>& magnitudes,
-                                       const ReferenceValues& values);
+                                       const ReferenceValues& values,
+                                       const std::vector<double>& hessian_magnitudes = {});
 
 /// A column of a rule's value at a point.
 Measured reference_value(const InterpolationRule& rule, const ReferenceWeights& weights,

@@ -30,6 +30,45 @@ bool CaseRunner::holds(std::size_t rule, Index point) const {
 }
 
 template <class Scalar>
+bool CaseRunner::holds(std::size_t rule, Index point, const Measured& value, const ReferenceGradients& gradients,
+                       int column) const {
+  const long double most = std::numeric_limits<Scalar>::max() / 1000;
+  if (!(value.magnitude < most) || !holds<Scalar>(rule, point)) return false;
+  const ReferenceWeights& weights = weights_[point];
+  const int gdim = mesh_.gdim(), sym = num_symmetric(gdim);
+  long double sum = 0;
+  for (int i = 0; i < weights.num_nodes && !gradients.gradient.empty(); ++i) {
+    std::array<long double, max_gdim> extent{};
+    for (int j = 0; j < weights.num_nodes; ++j)
+      for (int k = 0; k < gdim; ++k)
+        extent[k] = std::max(extent[k], std::abs(weights.rest[j][k].value - weights.rest[i][k].value));
+    const Index v = weights.vertices[i];
+    for (int k = 0; k < gdim; ++k) sum += gradients.gradient[v][column * gdim + k].magnitude * extent[k];
+    if (!named_rules()[rule].rule.needs_hessians()) continue;
+    for (int k = 0, entry = column * sym; k < gdim; ++k)
+      for (int l = k; l < gdim; ++l, ++entry) sum += gradients.hessian[v][entry].magnitude * extent[k] * extent[l];
+  }
+  return sum < most;
+}
+
+template <class Scalar>
+long double CaseRunner::rounding(Index point, const Measured& value, const ReferenceGradients& gradients,
+                                 int column) const {
+  const ReferenceWeights& weights = weights_[point];
+  const int gdim = mesh_.gdim(), sym = num_symmetric(gdim);
+  long double multiplied = 0, spread = 0;
+  for (int i = 0; i < weights.num_nodes; ++i) spread += weights.beta[i].magnitude;
+  for (int i = 0; i < weights.num_nodes && !gradients.gradient.empty(); ++i) {
+    const Index v = weights.vertices[i];
+    for (int k = 0; k < gdim; ++k) multiplied += gradients.gradient[v][column * gdim + k].magnitude;
+    for (int k = 0; k < sym && !gradients.hessian.empty(); ++k)
+      multiplied += gradients.hessian[v][column * sym + k].magnitude;
+  }
+  return std::numeric_limits<Scalar>::epsilon() * value.magnitude + std::numeric_limits<Scalar>::min() +
+         std::numeric_limits<Scalar>::denorm_min() * multiplied * spread * spread * spread;
+}
+
+template <class Scalar>
 void CaseRunner::check_bad_vertex(std::size_t rule, const Interpolant<Scalar>& interpolant, const Rows* rows,
                                   const Values<Scalar>& values, const Values<Scalar>& before,
                                   const std::string& place) {
@@ -216,10 +255,10 @@ void CaseRunner::check_rule(std::size_t rule_number, const Rows* rows) {
           reference_value(rule, weights_[p], coefficients_[rule_number][p], noise_gradients, noise_, mesh_.gdim(), c);
       reference[p][c] = value;
       // Beyond the greatest number of the type nothing is promised.
-      if (!(value.magnitude < std::numeric_limits<Scalar>::max() / 1000) || !holds<Scalar>(rule_number, p)) continue;
+      if (!holds<Scalar>(rule_number, p, value, noise_gradients, c)) continue;
       const bool finite = std::isfinite(found(p, c)) && std::isfinite(plain(p, c));
       record(StressProperty::finite, finite ? 0 : infinity, place);
-      const long double bound = steps * (epsilon * value.magnitude + least);
+      const long double bound = steps * rounding<Scalar>(p, value, noise_gradients, c);
       record(StressProperty::reference, ratio_of(std::abs(found(p, c) - value.value), bound), place + ", fast");
       // The weight of a blend is as well conditioned as the mismatches that decide it: each path rounds its own.
       if (rows == nullptr || !rows->blended()) {
@@ -232,25 +271,30 @@ void CaseRunner::check_rule(std::size_t rule_number, const Rows* rows) {
     }
   for (const auto& [a, b] : points_.shared)
     for (int c = 0; c < columns; ++c) {
-      const long double magnitude = reference[a][c].magnitude + reference[b][c].magnitude;
-      if (!(magnitude < std::numeric_limits<Scalar>::max() / 1000) || !holds<Scalar>(rule_number, a)) continue;
-      record(StressProperty::continuity,
-             ratio_of(std::abs(static_cast<long double>(found(a, c)) - found(b, c)),
-                      steps * (epsilon * magnitude + least)),
+      bool held = true;
+      long double bound = 0;
+      for (const Index p : {a, b}) {
+        held &= holds<Scalar>(rule_number, p, reference[p][c], noise_gradients, c);
+        bound += steps * rounding<Scalar>(p, reference[p][c], noise_gradients, c);
+      }
+      if (!held) continue;
+      record(StressProperty::continuity, ratio_of(std::abs(static_cast<long double>(found(a, c)) - found(b, c)), bound),
              place);
     }
 
+  const ReferenceGradients& affine_gradients = rows != nullptr ? rows->affine : none;
   const Values<Scalar> affine = interpolant.evaluate(affine_.values.cast<Scalar>());
   for (Index p = 0; p < num_points; ++p) {
     const auto position = point_position(p);
     for (int c = 0; c < columns; ++c) {
-      const Measured value = reference_value(rule, weights_[p], coefficients_[rule_number][p],
-                                             rows != nullptr ? rows->affine : none, affine_, mesh_.gdim(), c);
-      if (!(value.magnitude < std::numeric_limits<Scalar>::max() / 1000) || !holds<Scalar>(rule_number, p)) continue;
+      const Measured value =
+          reference_value(rule, weights_[p], coefficients_[rule_number][p], affine_gradients, affine_, mesh_.gdim(), c);
+      if (!holds<Scalar>(rule_number, p, value, affine_gradients, c)) continue;
       // The rows' own rounding is double's, whatever the frame's.
-      const double solved = std::max(epsilon, condition * std::numeric_limits<double>::epsilon());
-      record(StressProperty::affine,
-             ratio_of(std::abs(affine(p, c) - affine_value(position, c)), steps * (solved * value.magnitude + least)),
+      const double solved = condition * std::numeric_limits<double>::epsilon();
+      const long double bound =
+          std::max(rounding<Scalar>(p, value, affine_gradients, c), solved * value.magnitude + least);
+      record(StressProperty::affine, ratio_of(std::abs(affine(p, c) - affine_value(position, c)), steps * bound),
              place);
     }
   }
@@ -269,11 +313,15 @@ void CaseRunner::check_rule(std::size_t rule_number, const Rows* rows) {
     for (Index p = 0; p < num_points; ++p) {
       if (points_.embedding.status[p] != PointStatus::inside) continue;
       long double squared = 0, magnitude = 0;
+      // In a sliver far from the origin the last place of a position may lie beyond the cell.
+      bool held = true;
+      for (int i = 0; i < weights_[p].num_nodes; ++i) held &= weights_[p].beta[i].value >= -1e-9L;
       for (int c = 0; c < columns; ++c) {
         squared += std::pow(static_cast<long double>(rough(p, c)) - found(p, c), 2);
         magnitude += reference[p][c].magnitude;
+        held &= holds<Scalar>(rule_number, p, reference[p][c], noise_gradients, c);
       }
-      if (!(magnitude < std::sqrt(std::numeric_limits<Scalar>::max())) || !holds<Scalar>(rule_number, p)) continue;
+      if (!held || !(magnitude < std::sqrt(std::numeric_limits<Scalar>::max()))) continue;
       record(StressProperty::tolerance, ratio_of(std::sqrt(squared), tolerance + steps * (epsilon * magnitude + least)),
              place);
     }
@@ -289,11 +337,8 @@ void CaseRunner::check_rule(std::size_t rule_number, const Rows* rows) {
             .evaluate(noise_.values.cast<float>());
     for (Index p = 0; p < num_points; ++p)
       for (int c = 0; c < columns; ++c) {
-        if (!(reference[p][c].magnitude < std::numeric_limits<float>::max() / 1000) || !holds<float>(rule_number, p))
-          continue;
-        const long double bound =
-            2 * steps *
-            (std::numeric_limits<float>::epsilon() * reference[p][c].magnitude + std::numeric_limits<float>::min());
+        if (!holds<float>(rule_number, p, reference[p][c], noise_gradients, c)) continue;
+        const long double bound = 2 * steps * rounding<float>(p, reference[p][c], noise_gradients, c);
         record(StressProperty::precisions, ratio_of(std::abs(found(p, c) - single(p, c)), bound), place);
       }
   }

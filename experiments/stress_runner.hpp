@@ -95,6 +95,14 @@ class CaseRunner {
   // Whether the coefficients of a point are numbers of the type: far outside a small cell they are not.
   template <class Scalar>
   bool holds(std::size_t rule, Index point) const;
+  // Whether its value is, and what the gradients add to it anywhere in its cell: a path may compute that first.
+  template <class Scalar>
+  bool holds(std::size_t rule, Index point, const Measured& value, const ReferenceGradients& gradients,
+             int column) const;
+  // The bound of the rounding of a value, but for the number of steps. What underflows in a coefficient is multiplied
+  // by its gradient and by up to three weights.
+  template <class Scalar>
+  long double rounding(Index point, const Measured& value, const ReferenceGradients& gradients, int column) const;
   void check_smooth(std::size_t rule, const Rows* rows, const Interpolant<double>& interpolant,
                     const std::string& place);
   void check_matrix(std::size_t rule, const Interpolant<double>& interpolant, const Rows* rows,
@@ -127,8 +135,9 @@ class CaseRunner {
   std::vector<std::vector<ReferenceCoefficients>> coefficients_;  // [rule][point]
   std::vector<Rows> rows_;
   Index origin_ = 0;
-  double size_ = 0;    // of the mesh, a length
-  double aspect_ = 1;  // greatest |e||g| of a usable cell
+  double size_ = 0;           // of the mesh, a length
+  double aspect_ = 1;         // greatest |e||g| of a usable cell
+  double steepest_cell_ = 0;  // greatest |g|
   bool all_simplices_ = true;
   Eigen::MatrixXd slope_;  // of the affine values, columns × gdim
   Eigen::VectorXd shift_;

@@ -316,11 +316,12 @@ WeightPlanes<E::dim> weight_planes(const NodeMatrix<E>& gradient, const NodeMatr
   return planes;
 }
 
-// How far rounding blurs the weights of an affine cell.
+// How far rounding blurs the weights of an affine cell: that of their computation, and the last place of a position, in
+// which a cell far from the origin may be thin.
 template <Element E>
 double weight_blur(const NodeMatrix<E>& gradient, const NodeMatrix<E>& positions) {
-  const double blur = (gradient.cwiseAbs() * cell_extent<E>(positions)).maxCoeff();
-  return 32 * std::numeric_limits<double>::epsilon() * blur;
+  const ReferencePoint<E> blur = 32 * cell_extent<E>(positions) + positions.cwiseAbs().colwise().maxCoeff().transpose();
+  return std::numeric_limits<double>::epsilon() * (gradient.cwiseAbs() * blur).maxCoeff();
 }
 
 // An affine cell ready for tests. Flattened: small fixed-size products that are not inlined cost more than they

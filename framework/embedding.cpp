@@ -47,15 +47,18 @@ struct Extrapolation {
 };
 
 // The offset at the closest point, or, where J is singular there, at the first point on the way to the center where it
-// is not: the weights reproduce X from any ξ.
+// is not: the weights reproduce X from any ξ. At a corner whose nodes coincide but for rounding a column of J is short
+// beside that at the center, however well it is directed.
 template <Element E>
 Extrapolation<E> extrapolate(const InverseMap<E>& map, const ReferencePoint<E>& position,
                              const ReferencePoint<E>& closest) {
+  const auto column_norms = map.jacobian(E::center()).colwise().norm().eval();
   for (const double inward : {0.0, 1e-6, 1e-3, 0.1, 1.0}) {
     const ReferencePoint<E> xi = closest + inward * (E::center() - closest);
     const auto jacobian = map.jacobian(xi);
     const double determinant = jacobian.determinant();
-    if (inward < 1 && !(std::abs(determinant) > 1e-8 * jacobian.colwise().norm().prod())) continue;
+    if (inward < 1 && !(std::abs(determinant) > 1e-8 * jacobian.colwise().norm().cwiseMax(column_norms).prod()))
+      continue;
     const Eigen::FullPivLU<Eigen::Matrix<double, E::dim, E::dim>> solver(jacobian);
     ReferencePoint<E> offset = solver.solve(map.difference(position, xi));
     offset += solver.solve(map.difference(position, xi) - jacobian * offset);

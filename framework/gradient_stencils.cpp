@@ -106,6 +106,24 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
   return result;
 }
 
+void drop_short_edges(AdaptiveBlend& blend, double shortest) {
+  const auto gdim = static_cast<Offset>(blend.probing.gdim);
+  Offset kept = 0, begin = 0;
+  for (std::size_t r = 1; r < blend.edge_offsets.size(); ++r) {
+    const Offset end = blend.edge_offsets[r];
+    for (Offset e = begin; e < end; ++e) {
+      const double* const edge = blend.edges.data() + e * gdim;
+      if (Eigen::Map<const Eigen::VectorXd>(edge, gdim).stableNorm() < shortest) continue;
+      blend.edge_rows[kept] = blend.edge_rows[e];
+      std::copy_n(edge, gdim, blend.edges.begin() + kept++ * gdim);
+    }
+    begin = end;
+    blend.edge_offsets[r] = kept;
+  }
+  blend.edge_rows.resize(kept);
+  blend.edges.resize(kept * gdim);
+}
+
 void append_row(const GradientStencilTable& from, Index row, GradientStencilTable& to) {
   const Offset begin = from.offsets[row], end = from.offsets[row + 1];
   const auto append = [&](const auto& source, auto& target, int width) {

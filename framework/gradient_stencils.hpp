@@ -57,6 +57,9 @@ struct AdaptiveBlend {
   std::vector<double> edges;            ///< gdim an edge: X_j − X_v, never zero
 };
 
+/// Leaves out the edges that are shorter than a length.
+void drop_short_edges(AdaptiveBlend& blend, double shortest);
+
 /// The edges of one vertex as a metric of gradients: Σ êêᵀ, ê = e / |e|, and the inverse of that sum plus a tenth of
 /// its mean eigenvalue, which stays bounded where the edges hardly span the space. Zero where the vertex has no edges.
 struct EdgeMetric {
@@ -66,9 +69,12 @@ EdgeMetric edge_metric(const AdaptiveBlend& blend, Index row, int gdim);
 
 /// The weight of the fitted gradient by the mismatches of the fitted and of the averaged one, 1 / (1 + 2 q⁶) of their
 /// ratio. `squares` are those of what mismatches are differences of: below (1000 ε)² of them both are rounding, as
-/// where the edges do not see that the gradients differ, and the fitted one is taken.
+/// where the edges do not see that the gradients differ, and the fitted one is taken. Mismatches beyond the numbers of
+/// the type tell nothing: the average is taken, which is no steeper than the cells.
 template <class Scalar>
 Scalar fitted_weight(Scalar fitted, Scalar averaged, Scalar squares) {
+  constexpr Scalar most = std::numeric_limits<Scalar>::max();
+  if (!(fitted <= most && averaged <= most)) return 0;
   constexpr Scalar rounding = 1000 * std::numeric_limits<Scalar>::epsilon();
   const Scalar ratio = fitted > 0 ? fitted / (averaged + rounding * rounding * squares) : 0;
   const Scalar cubed = ratio * ratio * ratio;

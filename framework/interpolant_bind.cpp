@@ -293,6 +293,8 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
 
 template <class Scalar>
 void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
+  // Quotients along edges must be numbers of the type with room for their products.
+  drop_short_edges(*blended->blend, 1000 * static_cast<double>(std::numeric_limits<Scalar>::min()));
   const AdaptiveBlend& given = *blended->blend;
   // Rows of the probing table are vertices of the same number.
   for (Index r = num_active; r < given.probing.num_rows(); ++r) {

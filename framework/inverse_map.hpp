@@ -139,7 +139,7 @@ class InverseMap {
       const double length = step.norm();
       if (!std::isfinite(length)) break;
       if (length > 1) step /= length;
-      const bool polishing = residual < 1e-10;
+      const bool polishing = residual < 1e-13;
       bool reduced = false;
       for (double damping = 1; damping > 1e-4 && !reduced; damping *= 0.5) {
         const Point trial = result.xi + damping * step;

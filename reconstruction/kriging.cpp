@@ -90,20 +90,25 @@ class KrigingRow {
     row.diagnostics.smallest_singular_value = static_cast<float>(best_.smallest_singular_value);
     row.diagnostics.expected_error = static_cast<float>(best_.expected_error);
     if (best_.quadratic_response > missing_modes * std::sqrt(cells_->gdim())) return fall_back(vertex, row);
-    write(row);
+    write(vertex, row);
     row.diagnostics.rule =
         !accepted ? StencilRule::damped : (best_entry_ == first ? StencilRule::full_fit : StencilRule::wider_patch);
   }
 
  private:
   // The local unit of length and the coordinates in which patches are chosen and fitted: y = T (X − X_v). False where
-  // the vertex has no neighbour at a distance.
+  // the vertex has no neighbour at a distance; those in the same place, but for rounding, tell nothing of lengths.
   bool find_metric(Index vertex) {
     const int gdim = cells_->gdim();
     const auto origin = cells_->vertices().row(vertex);
     const std::span<const Index> near = rings_.within(2);
     distances_.clear();
-    for (Index v : near) distances_.push_back((cells_->vertices().row(v) - origin).squaredNorm());
+    double farthest = 0;
+    for (Index v : near) {
+      distances_.push_back((cells_->vertices().row(v) - origin).squaredNorm());
+      farthest = std::max(farthest, distances_.back());
+    }
+    std::erase_if(distances_, [farthest](double squared) { return !(squared > 1e-24 * farthest); });
     const std::size_t count = std::min<std::size_t>(2 * gdim, distances_.size());
     if (count == 0) return false;
     std::nth_element(distances_.begin(), distances_.begin() + (count - 1), distances_.end());
@@ -176,25 +181,30 @@ class KrigingRow {
     row.hessian_weights.assign(best_.hessian.rows() * count, 0.0);
   }
 
-  // Back from the metric: ∂/∂X = T ∂/∂y.
-  void write(StencilRow& row) const {
+  // Back from the metric: ∂/∂X = T ∂/∂y. Its rounding, times its condition, is taken out of the linear constraint.
+  void write(Index vertex, StencilRow& row) {
     const int gdim = cells_->gdim();
+    const Eigen::Index count = best_.gradient.cols(), symmetric = best_.hessian.rows();
     row.neighbors = best_patch_;
-    row.diagnostics.num_points = static_cast<Index>(best_patch_.size());
+    row.diagnostics.num_points = static_cast<Index>(count);
     row.diagnostics.absolute_sum = static_cast<float>(best_.absolute_sum);
     row.weights.resize(best_.gradient.size());
-    Eigen::Map<Eigen::MatrixXd>(row.weights.data(), best_.gradient.rows(), best_.gradient.cols()).noalias() =
-        metric_ * best_.gradient;
     row.hessian_weights.resize(best_.hessian.size());
-    if (row.hessian_weights.empty()) return;
-    for (Eigen::Index j = 0; j < best_.hessian.cols(); ++j) {
+    Eigen::Map<Eigen::MatrixXd> gradient(row.weights.data(), gdim, count),
+        hessians(row.hessian_weights.data(), symmetric, count);
+    gradient.noalias() = metric_ * best_.gradient;
+    for (Eigen::Index j = 0; j < count && symmetric > 0; ++j) {
       SmallMatrix hessian(gdim, gdim);
       for (int a = 0, s = 0; a < gdim; ++a)
         for (int b = a; b < gdim; ++b, ++s) hessian(a, b) = hessian(b, a) = best_.hessian(s, j);
       hessian = (metric_ * hessian * metric_).eval();
       for (int a = 0, s = 0; a < gdim; ++a)
-        for (int b = a; b < gdim; ++b, ++s) row.hessian_weights[j * num_symmetric(gdim) + s] = hessian(a, b);
+        for (int b = a; b < gdim; ++b, ++s) hessians(s, j) = hessian(a, b);
     }
+    points_.resize(gdim, count);
+    for (Eigen::Index j = 0; j < count; ++j)
+      points_.col(j) = (cells_->vertices().row(best_patch_[j]) - cells_->vertices().row(vertex)).transpose();
+    restore_affine(points_, gradient, hessians);
   }
 
   const CellGradients* cells_;

@@ -156,6 +156,22 @@ double fit_stage(Stage& stage, bool damp, Block& basis, Eigen::Index& num_basis,
 
 }  // namespace
 
+void restore_affine(const Eigen::Ref<const MatrixXd>& edges, Eigen::Ref<MatrixXd> gradient,
+                    Eigen::Ref<MatrixXd> hessian) {
+  constexpr double negligible = 1e-14;
+  const Eigen::Index dim = edges.rows();
+  // Across a needle the residual may have large entries, and yet its square is small.
+  double before = std::numeric_limits<double>::infinity();
+  for (int pass = 0; pass < 3; ++pass) {
+    const SmallSquare residual = SmallSquare::Identity(dim, dim) - gradient.lazyProduct(edges.transpose());
+    const double size = residual.cwiseAbs().maxCoeff();
+    if (!(size > negligible) || !(size < before / 2)) break;
+    gradient += residual.lazyProduct(gradient).eval();
+    before = size;
+  }
+  if (hessian.rows() > 0) hessian -= SmallSquare(hessian.lazyProduct(edges.transpose())).lazyProduct(gradient);
+}
+
 KrigingSystem::KrigingSystem(int dim, int degree) : dim_(dim), degree_(degree) {}
 
 void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& fit) {
@@ -243,19 +259,11 @@ void KrigingSystem::solve(const Eigen::Ref<const MatrixXd>& points, KrigingFit& 
   weights = rows_out.leftCols(n);
   cholesky.matrixL().solveInPlace<Eigen::OnTheRight>(weights);
 
-  // Where points lie at very different distances the higher degrees leave their rounding, relative to their squares and
-  // cubes, in the linear constraint: that gradients of linear functions are exact and their Hessians zero. It is met
-  // once more by itself.
-  SmallSquare residual = -weights.lazyProduct(points.transpose());
-  residual.topRows(dim) += SmallSquare::Identity(dim, dim);
-  if (residual.cwiseAbs().maxCoeff() > 1e-13) {
-    Block linear = arena.take(dim, n);
-    linear = stages[0].inverse;
-    cholesky.matrixL().solveInPlace<Eigen::OnTheRight>(linear);
-    weights += residual.lazyProduct(linear);
-  }
   fit.gradient = weights.topRows(dim);
   fit.hessian = weights.bottomRows(num_functionals - dim);
+  // Where points lie at very different distances the higher degrees leave their rounding, relative to their squares and
+  // cubes, in the linear constraint.
+  restore_affine(points, fit.gradient, fit.hessian);
   fit.absolute_sum = fit.gradient.colwise().norm().sum();
   fit.quadratic_response = (fit.gradient * quadratics).norm();
   fit.expected_error = std::sqrt(100 * fit.quadratic_response * fit.quadratic_response +

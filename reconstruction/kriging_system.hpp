@@ -16,6 +16,12 @@ struct KrigingFit {
   double expected_error = 0;           ///< J = sqrt(E2² / 0.1² + kriging variance / a⁶)
 };
 
+/// Weights that take the gradient (dim × #points) and Hessian (any rows) of linear functions, from their differences
+/// along `edges` (dim × #points), to the identity and zero as far as rounding lets them: steps of Newton's iteration
+/// for an inverse (Schulz 1933) on Σ g_j e_jᵀ. Where the edges do not span the space it changes nothing but rounding.
+void restore_affine(const Eigen::Ref<const Eigen::MatrixXd>& edges, Eigen::Ref<Eigen::MatrixXd> gradient,
+                    Eigen::Ref<Eigen::MatrixXd> hessian);
+
 /// Universal kriging of the gradient (and Hessian) at the origin from differences to it: a polynomial drift of degree
 /// two or three, Matérn-7/2 covariance of what is left, and damping of the modes that the points barely determine.
 /// Holds the workspace; one a thread.

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <random>
 
 #include "framework/cell_locator.hpp"
@@ -122,7 +123,7 @@ TEST(StressFound, VerticesWithoutVolumeHaveNoGradient) {
   Points vertices(6, 2);
   vertices << unit_triangle(), 5.1, 5.3, 6.1, 6.3, 7.1, 7.3;
   const Mesh mesh = triangles(vertices, {{0, 1, 2}, {3, 4, 5}});
-  for (const nlohmann::json& drift : {"quadratic", "cubic"}) {
+  for (const char* const drift : {"quadratic", "cubic"}) {
     const Reconstruction rows = make_reconstructor({{"kriging", {{"drift", drift}}}})
                                     .reconstructor->reconstruct(CellGradients(mesh), std::array{0, 4});
     EXPECT_EQ(rows.stencils.diagnostics[0].rule, StencilRule::cell_value);
@@ -204,6 +205,116 @@ TEST(StressFound, SliversHoldTheirPointsAndNeedlesReproduceThem) {
       EXPECT_LT((beta.transpose() * turned - points.row(p)).norm(), 1e-12);
     }
   }
+}
+
+// |Σ_j (X_j − X_v) ⊗ g_vj − I| over Σ_j |X_j − X_v| |g_vj|.
+double affine_residual(const Mesh& mesh, const GradientStencilTable& table, Index row) {
+  const int gdim = mesh.gdim();
+  SmallMatrix product = -SmallMatrix::Identity(gdim, gdim);
+  double magnitude = 1;
+  for (Offset e = table.offsets[row]; e < table.offsets[row + 1]; ++e) {
+    const Vector edge =
+        (mesh.vertices().row(table.neighbors[e]) - mesh.vertices().row(table.vertices[row])).transpose();
+    const Eigen::Map<const Eigen::VectorXd> weight(table.weights.data() + e * gdim, gdim);
+    product += edge * weight.transpose();
+    magnitude += edge.norm() * weight.norm();
+  }
+  return product.cwiseAbs().maxCoeff() / magnitude;
+}
+
+// The nearest vertices were all in the same place, beyond flat cells, and gave a unit of length of zero: no gradient.
+TEST(StressFound, VerticesInOnePlaceDoNotHideTheOthers) {
+  Points vertices(4, 1);
+  vertices << 0, 1, 1, 1;
+  ElementBlock<Segment> block;
+  block.cells.resize(3, 2);
+  block.cells << 0, 1, 1, 2, 2, 3;
+  const Mesh mesh(vertices, {block});
+  for (const nlohmann::json& options :
+       {nlohmann::json::object(), nlohmann::json{{"patch", "lean"}}, nlohmann::json{{"drift", "cubic"}}}) {
+    const Reconstruction rows =
+        make_reconstructor({{"kriging", options}}).reconstructor->reconstruct(CellGradients(mesh), std::array{1});
+    EXPECT_LT(affine_residual(mesh, rows.stencils, 0), 1e-14) << options;
+  }
+}
+
+// The metric of a needle of 1e6 to 1 left its rounding, times a million, in the rows.
+TEST(StressFound, RowsOfObliqueNeedlesKeepAffineValues) {
+  const Mesh unit = test::lattice<Triangle>(4, 0.2, 1);
+  Points vertices = unit.vertices();
+  vertices.col(1) *= 3e-7;
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(0.7).toRotationMatrix();
+  const Mesh mesh(Points(vertices * turn.transpose()), unit.blocks());
+  std::vector<Index> all(mesh.num_vertices());
+  std::iota(all.begin(), all.end(), 0);
+  for (const char* const drift : {"quadratic", "cubic"}) {
+    const Reconstruction rows =
+        make_reconstructor({{"kriging", {{"drift", drift}}}}).reconstructor->reconstruct(CellGradients(mesh), all);
+    for (const Index v : all) EXPECT_LT(affine_residual(mesh, rows.stencils, v), 1e-14) << drift << v;
+  }
+}
+
+// Where two nodes of a quadrilateral coincide but for rounding, J at the corner has a column of that rounding, well
+// directed: the solver took it for zero and lost a coordinate.
+TEST(StressFound, WeightsBesideANearlyCollapsedCornerReproducePositions) {
+  Points vertices(4, 2);
+  vertices << 0, 0, -1.8e-16, 0, 1, -1, 1, 0;
+  ElementBlock<Quadrilateral> block;
+  block.cells.resize(1, 4);
+  block.cells << 0, 1, 2, 3;
+  const Mesh mesh(vertices, {block});
+  Points points(1, 2);
+  points << -200, -100;
+  const Embedding embedding = embed(mesh, points, {.outside = Outside::nearest});
+  ASSERT_EQ(embedding.outside.size(), 1u);
+  const Eigen::Vector2d xi = embedding.local.row(0).transpose(), offset = embedding.outside[0].offset;
+  const Eigen::Vector4d beta = Quadrilateral::shape(xi) + Quadrilateral::shape_gradient(xi) * offset;
+  EXPECT_LT((beta.transpose() * vertices - points.row(0)).norm(), 1e-8);
+}
+
+// An edge of 1e-25, of a flat cell, has difference quotients whose squares, and one of 1e-39 even whose factor 2 / |e|,
+// are no floats.
+TEST(StressFound, AdaptiveBlendsFloatsBesideShortEdges) {
+  for (const double scale : {1.0, 1e-25}) {
+    for (const double length : {1e-14, 1e-25}) {
+      Points vertices(5, 2);
+      vertices << 0, 0, 1, 0, 0, 1, 1, 1, 0, -length;
+      const Mesh mesh = triangles(scale * vertices, {{0, 1, 2}, {1, 3, 2}, {4, 0, 2}});
+      Points points(2, 2);
+      points << 0.25, 0.25, 0.75, 0.75;
+      const Embedding embedding = embed(mesh, scale * points);
+      const Reconstruction rows =
+          make_reconstructor("adaptive")
+              .reconstructor->reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+      const Interpolant<float> phong(mesh, embedding, named_rule("phong"), &rows);
+      Values<float> values(5, 2);
+      values << 0.1f, 0, 1, 0.2f, 0.3f, 1, 1, 2, 0.7f, -0.4f;
+      values *= static_cast<float>(scale);
+      for (const Kernel kernel : {Kernel::fast, Kernel::plain})
+        EXPECT_TRUE(phong.evaluate(values, {.kernel = kernel}).allFinite()) << scale << " " << length;
+      values.rowwise() = values.row(1).eval();
+      EXPECT_EQ(phong.evaluate(values).row(0), values.row(0)) << scale << " " << length;
+    }
+  }
+}
+
+// A triangle as thick as four last places of its coordinates, far from the origin: its own centroid, rounded, lay
+// outside of it.
+TEST(StressFound, SliversFarAwayHoldTheirRoundedCentroids) {
+  const double place = 0x1p-19;  // of the last digit at 2^33
+  Points vertices(3, 2);
+  vertices << 0, 0, 1, 0.25 + 4 * place, 0.5, 0.125;
+  vertices.array() += 0x1p33;
+  const Mesh mesh = triangles(vertices, {{0, 1, 2}});
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0.01, 1);
+  Points points(200, 2);
+  for (Index p = 0; p < points.rows(); ++p) {
+    Eigen::RowVector3d beta(uniform(random), uniform(random), uniform(random));
+    points.row(p) = beta / beta.sum() * vertices;
+  }
+  const CellLocations found = locate(mesh, points, 1e-9);
+  for (Index p = 0; p < points.rows(); ++p) EXPECT_EQ(found.cells[p], 0) << p;
 }
 
 }  // namespace
