@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 #include "framework/error.hpp"
 #include "framework/parallel.hpp"
@@ -42,15 +43,27 @@ Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const V
   return apply_weights(table, table.hessian_weights, num_symmetric(table.gdim), values);
 }
 
+Vector weighted_edge(const AdaptiveBlend& blend, Offset edge, int gdim) {
+  const Eigen::Map<const Eigen::VectorXd> along(blend.edges.data() + edge * gdim, gdim);
+  return along / std::pow(along.norm(), 1.5);
+}
+
 EdgeMetric edge_metric(const AdaptiveBlend& blend, Index row, int gdim) {
   EdgeMetric result{SmallMatrix::Zero(gdim, gdim), SmallMatrix::Zero(gdim, gdim)};
   for (Offset e = blend.edge_offsets[row]; e < blend.edge_offsets[row + 1]; ++e) {
-    const Vector unit = Eigen::Map<const Eigen::VectorXd>(blend.edges.data() + e * gdim, gdim).normalized();
-    result.sum += unit * unit.transpose();
+    const Vector edge = weighted_edge(blend, e, gdim);
+    result.sum += edge * edge.transpose();
   }
   const double mean = result.sum.trace() / gdim;
   if (mean > 0) result.damped_inverse = (result.sum + 0.1 * mean * SmallMatrix::Identity(gdim, gdim)).inverse();
   return result;
+}
+
+GradientStencilTable fitted_rows(const Reconstruction& reconstruction) {
+  GradientStencilTable rows = reconstruction.stencils;
+  const GradientStencilTable& beyond = reconstruction.blend.value().beyond;
+  for (Index r = 0; r < beyond.num_rows(); ++r) append_row(beyond, r, rows);
+  return rows;
 }
 
 template <class Scalar>
@@ -60,9 +73,10 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
   const int gdim = table.gdim;
   const Eigen::Index columns = values.cols();
   Values<Scalar> result = apply_stencils(blend.averaging, values);
-  const Values<Scalar> fitted = apply_stencils(table, values), probing = apply_stencils(blend.probing, values);
+  const GradientStencilTable rows = fitted_rows(reconstruction);
+  const Values<Scalar> fitted = apply_stencils(rows, values);
   parallel_for(table.num_rows(), 256, [&](std::int64_t begin, std::int64_t end) {
-    Eigen::MatrixXd average, fit, probe, moment;  // #columns × gdim
+    Eigen::MatrixXd average, fit, other, moment;  // #columns × gdim
     Eigen::VectorXd mismatch;
     const auto load = [&](const Values<Scalar>& gradients, Index r, Eigen::MatrixXd& into) {
       into = Eigen::Map<const Values<Scalar>>(gradients.data() + r * columns * gdim, columns, gdim)
@@ -71,34 +85,28 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
     for (Index r = static_cast<Index>(begin); r < end; ++r) {
       load(result, r, average);
       load(fitted, r, fit);
-      load(probing, r, probe);
-      // Mismatches m of the probing gradient: their squares and Σ m êᵀ tell those of every other gradient.
-      double squares = 0, quotients = 0;
+      // The mismatches m of the fitted gradient: their squares and Σ m êᵀ tell those of every other gradient.
+      double squares = 0;
       moment = Eigen::MatrixXd::Zero(columns, gdim);
       for (Offset e = blend.edge_offsets[r]; e < blend.edge_offsets[r + 1]; ++e) {
-        const Index other = blend.edge_rows[e];
-        const Eigen::Map<const Eigen::VectorXd> edge(blend.edges.data() + e * gdim, gdim);
-        const double length = edge.norm();
-        mismatch = (2 / length) * (values.row(blend.probing.vertices[other]) - values.row(table.vertices[r]))
-                                      .transpose()
-                                      .template cast<double>();
-        quotients += mismatch.squaredNorm();
-        const Eigen::Map<const Values<Scalar>> neighbor(probing.data() + other * columns * gdim, columns, gdim);
-        mismatch -= (probe + neighbor.template cast<double>()) * (edge / length);
+        const Index row = blend.edge_rows[e];
+        const Vector edge = weighted_edge(blend, e, gdim);
+        load(fitted, row, other);
+        // |e|^(−3/2) = |ê|³
+        mismatch = 2 * std::pow(edge.norm(), 3) *
+                       (values.row(rows.vertices[row]) - values.row(table.vertices[r])).transpose().template cast<double>() -
+                   (fit + other) * edge;
         squares += mismatch.squaredNorm();
-        moment += mismatch * (edge / length).transpose();
+        moment += mismatch * edge.transpose();
       }
       const EdgeMetric metric = edge_metric(blend, r, gdim);
-      // What a change of the gradient adds to the squares.
-      const auto added = [&](const Eigen::MatrixXd& change) {
-        return (change * metric.sum - 2 * moment).cwiseProduct(change).sum();
-      };
-      const Eigen::MatrixXd prediction = moment * metric.damped_inverse;
-      const double common = 2 * squares + added(prediction);
+      const Eigen::MatrixXd correction = moment * metric.damped_inverse, change = average - fit;
+      const double predicted = squares - correction.cwiseProduct(moment).sum();
+      const double averaged = squares + (change * metric.sum - 2 * moment).cwiseProduct(change).sum();
       const auto weight = static_cast<double>(fitted_weight(
-          static_cast<Scalar>(std::max(0.0, common + added(fit - probe) / 2)),
-          static_cast<Scalar>(std::max(0.0, common + added(average - probe))), static_cast<Scalar>(quotients)));
-      fit += blend.prediction_share * (probe + prediction - fit);
+          static_cast<Scalar>(squares), static_cast<Scalar>(predicted), static_cast<Scalar>(std::max(0.0, averaged)),
+          static_cast<Scalar>(4 * metric.sum.trace() * fit.squaredNorm()), static_cast<Scalar>(blend.caution[r])));
+      fit += blend.prediction_share * correction;
       Eigen::Map<Values<Scalar>>(result.data() + r * columns * gdim, columns, gdim) =
           (average + weight * (fit - average)).template cast<Scalar>();
     }
@@ -135,6 +143,14 @@ void append_row(const GradientStencilTable& from, Index row, GradientStencilTabl
   if (from.has_hessians()) append(from.hessian_weights, to.hessian_weights, num_symmetric(from.gdim));
   if (!from.diagnostics.empty()) to.diagnostics.push_back(from.diagnostics[row]);
   to.offsets.push_back(to.num_entries());
+}
+
+GradientStencilTable split_rows(GradientStencilTable& table, Index first) {
+  GradientStencilTable head, tail;
+  head.gdim = tail.gdim = table.gdim;
+  for (Index r = 0; r < table.num_rows(); ++r) append_row(table, r, r < first ? head : tail);
+  table = std::move(head);
+  return tail;
 }
 
 Reconstruction select_rows(const Reconstruction& reconstruction, std::span<const Index> vertices) {

@@ -1,6 +1,7 @@
 // Vertex gradients as weights on vertex values: what every reconstructor ends in.
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <span>
@@ -50,35 +51,41 @@ struct GradientStencilTable {
 /// `adaptive`; the rule is that of blended_gradients()).
 struct AdaptiveBlend {
   GradientStencilTable averaging;       ///< the rows of the main table, in its order
-  GradientStencilTable probing;         ///< the same rows, then those of their neighbours: what edges are tested with
+  GradientStencilTable beyond;          ///< rows of the main table's kind, of neighbours that it lacks
   double prediction_share = 0;          ///< 0 … 1, of the neighbours' prediction in the fitted gradient
+  std::vector<double> caution;          ///< a row of the main table: what the mismatch ratio is multiplied by
   std::vector<Offset> edge_offsets{0};  ///< #rows of the main table + 1
-  std::vector<Index> edge_rows;         ///< row of `probing` of the edge's other vertex
+  std::vector<Index> edge_rows;         ///< row of the edge's other vertex in the main table, or behind it in `beyond`
   std::vector<double> edges;            ///< gdim an edge: X_j − X_v, never zero
 };
 
 /// Leaves out the edges that are shorter than a length.
 void drop_short_edges(AdaptiveBlend& blend, double shortest);
 
-/// The edges of one vertex as a metric of gradients: Σ êêᵀ, ê = e / |e|, and the inverse of that sum plus a tenth of
-/// its mean eigenvalue, which stays bounded where the edges hardly span the space. Zero where the vertex has no edges.
+/// e / |e|^(3/2), what mismatches along an edge are weighted by (docs/adaptive.md).
+Vector weighted_edge(const AdaptiveBlend& blend, Offset edge, int gdim);
+
+/// The edges of one vertex as a metric of gradients: Σ êêᵀ, ê = e / |e|^(3/2), and the inverse of that sum plus a tenth
+/// of its mean eigenvalue, which stays bounded where the edges hardly span the space. Zero where the vertex has none.
 struct EdgeMetric {
   SmallMatrix sum, damped_inverse;  ///< gdim × gdim
 };
 EdgeMetric edge_metric(const AdaptiveBlend& blend, Index row, int gdim);
 
-/// The weight of the fitted gradient by the mismatches of the fitted and of the averaged one, 1 / (1 + 2 q⁶) of their
-/// ratio. `squares` are those of what mismatches are differences of: below (1000 ε)² of them both are rounding, as
-/// where the edges do not see that the gradients differ, and the fitted one is taken. Mismatches beyond the numbers of
-/// the type tell nothing: the average is taken, which is no steeper than the cells.
+/// The weight of the fitted gradient, 1 / (1 + r⁶) of r = caution · sqrt(fitted · predicted) / averaged, the mismatches
+/// of the fitted gradient, of the best that its neighbours leave room for, and of the averaged one. `squares` are those
+/// of what mismatches are differences of: mismatches below (1000 ε)² of them are rounding, as where the edges do not
+/// see that the gradients differ, and the fitted one is taken. Mismatches beyond the numbers of the type tell nothing:
+/// the average is taken, which is no steeper than the cells.
 template <class Scalar>
-Scalar fitted_weight(Scalar fitted, Scalar averaged, Scalar squares) {
+Scalar fitted_weight(Scalar fitted, Scalar predicted, Scalar averaged, Scalar squares, Scalar caution) {
   constexpr Scalar most = std::numeric_limits<Scalar>::max();
-  if (!(fitted <= most && averaged <= most)) return 0;
+  if (!(fitted <= most && predicted <= most && averaged <= most)) return 0;
   constexpr Scalar rounding = 1000 * std::numeric_limits<Scalar>::epsilon();
-  const Scalar ratio = fitted > 0 ? fitted / (averaged + rounding * rounding * squares) : 0;
+  if (!(fitted > 0) || !(predicted > 0)) return 1;
+  const Scalar ratio = caution * std::sqrt(fitted) * std::sqrt(predicted) / (averaged + rounding * rounding * squares);
   const Scalar cubed = ratio * ratio * ratio;
-  return 1 / (1 + 2 * cubed * cubed);
+  return 1 / (1 + cubed * cubed);
 }
 
 /// What a reconstructor gives: one linear table, or two with a data-dependent blend.
@@ -86,6 +93,9 @@ struct Reconstruction {
   GradientStencilTable stencils;
   std::optional<AdaptiveBlend> blend;
 };
+
+/// The rows that edges are tested with: those of the main table, then those of `beyond`.
+GradientStencilTable fitted_rows(const Reconstruction& reconstruction);
 
 /// Applies a table: row r of the result is F_v (and Q_v), (row = component, column = axis) flattened row-major,
 /// #rows × (#columns · gdim). Values are #vertices × #columns.
@@ -96,17 +106,20 @@ Values<Scalar> apply_stencils(const GradientStencilTable& table, const Values<Sc
 template <class Scalar>
 Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const Values<Scalar>& values);
 
-/// Gradients under a blend (reconstructor `adaptive`), #rows × (#columns · gdim). With F_c, F_k and L the gradients of
-/// `averaging`, the main table and `probing`, the mismatch of a gradient F at v with its neighbours is
-///   E(F) = Σ over edges e of |2 (x_j − x_v) − (F + L_j) e|² / |e|²,
-/// P = L_v + Σ m êᵀ · damped_inverse (m the mismatches of L_v) is the neighbours' prediction, and
+/// Gradients under a blend (reconstructor `adaptive`), #rows × (#columns · gdim). With F_c and F_k the gradients of
+/// `averaging` and of the main table, ê = e / |e|^(3/2), the mismatch of a gradient F at v with its neighbours is
+///   E(F) = Σ over edges e of |2 (x_j − x_v) |e|^(−3/2) − (F + F_k,j) ê|²,
+/// P = F_k + Σ m êᵀ · damped_inverse (m the mismatches of F_k) is the neighbours' prediction, and
 ///   F = F_c + w (F_s − F_c),  F_s = F_k + share (P − F_k),
-///   w = fitted_weight((E(L) + E(F_k)) / 2 + E(P), E(F_c) + E(P), Σ |2 (x_j − x_v)|² / |e|²).
+///   w = fitted_weight(E(F_k), E(F_k) − Σ m êᵀ · (P − F_k), E(F_c), 4 Σ |ê|² |F_k|², caution).
 template <class Scalar>
 Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Values<Scalar>& values);
 
 /// Appends a row of `from`, with its vertex and what is told of it, to a table of the same kind.
 void append_row(const GradientStencilTable& from, Index row, GradientStencilTable& to);
+
+/// Takes the rows from `first` on out of a table.
+GradientStencilTable split_rows(GradientStencilTable& table, Index first);
 
 /// The rows of `vertices`, in that order. A reconstruction with a blend must already have exactly these. Throws Error
 /// where a vertex has no row.

@@ -364,26 +364,22 @@ void Interpolant<Scalar>::Binding::blend_lines(const Scalar* positions, const st
                                                Workspace<Scalar>& workspace, Scalar* lines) const {
   std::array<Scalar, 9> one;
   one.fill(1);
-  const Index num_probing = blend.num_probing();
-  const Offset length = 4 * (1 + gdim);
-  Scalar* const averaging = reserve<Scalar>(workspace.averaging, num_active * length);
-  Scalar* const probing = reserve<Scalar>(workspace.probing, num_probing * length);
+  Scalar* const fitted = reserve<Scalar>(workspace.fitted, stencils.num_rows() * 4 * (1 + Offset{gdim}));
   const auto run = [](Index num_rows, const auto& stage) {
     parallel_for(num_rows, vertex_grain(num_rows), [&](std::int64_t begin, std::int64_t end) {
       stage.run(static_cast<Index>(begin), static_cast<Index>(end));
     });
   };
-  run(num_active, vertex_stage(stencils, gdim, one, positions, lines));
-  run(num_active, vertex_stage(blend.averaging, gdim, one, positions, averaging));
-  run(num_probing, vertex_stage(blend.probing, gdim, one, positions, probing));
+  run(num_active, vertex_stage(blend.averaging, gdim, one, positions, lines));
+  run(stencils.num_rows(), vertex_stage(stencils, gdim, one, positions, fitted));
   const AdaptiveBlend& given = *blended->blend;
   run(num_active, kernels::BlendStage<Scalar>{.dim = gdim,
                                               .edge_offsets = given.edge_offsets.data(),
                                               .edge_rows = given.edge_rows.data(),
                                               .edges = blend.edges.data(),
                                               .metrics = blend.metrics.data(),
-                                              .averaging = averaging,
-                                              .probing = probing,
+                                              .caution = blend.caution.data(),
+                                              .fitted = fitted,
                                               .prediction_share = static_cast<Scalar>(given.prediction_share),
                                               .scale = scale,
                                               .lines = lines});

@@ -42,8 +42,8 @@ struct EvaluateOptions {
 template <class Scalar>
 struct Workspace {
   Values<Scalar> gradients, hessians;                  ///< of the plain path
-  std::vector<kernels::CacheLine> positions, lines;    ///< of the fast path
-  std::vector<kernels::CacheLine> averaging, probing;  ///< lines that a blend reads
+  std::vector<kernels::CacheLine> positions, lines;  ///< of the fast path
+  std::vector<kernels::CacheLine> fitted;            ///< lines that a blend reads
   Values<Scalar> sorted;                               ///< results before they go to the caller's order
 
   std::vector<std::uint8_t> moved;  ///< of update_sorted: vertices whose values changed, then those whose lines did

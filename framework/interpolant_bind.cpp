@@ -285,8 +285,9 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
   if (reconstruction->blend) {
     blended = select_rows(*reconstruction, vertices);
     take_blend(number);
+  } else {
+    pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
   }
-  pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
   vertices.shrink_to_fit();
   report.num_stencil_entries += table.num_entries();
 }
@@ -296,25 +297,25 @@ void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
   // Quotients along edges must be numbers of the type with room for their products.
   drop_short_edges(*blended->blend, 1000 * static_cast<double>(std::numeric_limits<Scalar>::min()));
   const AdaptiveBlend& given = *blended->blend;
-  // Rows of the probing table are vertices of the same number.
-  for (Index r = num_active; r < given.probing.num_rows(); ++r) {
-    number[given.probing.vertices[r]] = static_cast<Index>(vertices.size());
-    vertices.push_back(given.probing.vertices[r]);
+  const GradientStencilTable rows = fitted_rows(*blended);
+  for (Index r = num_active; r < rows.num_rows(); ++r) {
+    number[rows.vertices[r]] = static_cast<Index>(vertices.size());
+    vertices.push_back(rows.vertices[r]);
   }
-  pack_stencils(given.probing, false, given.probing.num_rows(), vertices, number, blend.probing);
+  pack_stencils(rows, false, rows.num_rows(), vertices, number, stencils);
   pack_stencils(given.averaging, false, num_active, vertices, number, blend.averaging);
-  report.num_stencil_entries += given.probing.num_entries() + given.averaging.num_entries();
+  report.num_stencil_entries += given.beyond.num_entries() + given.averaging.num_entries();
   for (Offset e = 0; e < static_cast<Offset>(given.edge_rows.size()); ++e) {
-    const Eigen::Map<const Eigen::VectorXd> edge(given.edges.data() + e * gdim, gdim);
-    const double length = edge.norm();
-    blend.edges.push_back(static_cast<Scalar>(2 / length));
-    for (int a = 0; a < gdim; ++a) blend.edges.push_back(static_cast<Scalar>(edge[a] / length));
+    const Vector edge = weighted_edge(given, e, gdim);
+    blend.edges.push_back(static_cast<Scalar>(2 * std::pow(edge.norm(), 3)));
+    for (int a = 0; a < gdim; ++a) blend.edges.push_back(static_cast<Scalar>(-edge[a]));
   }
   for (Index r = 0; r < num_active; ++r) {
     const EdgeMetric metric = edge_metric(given, r, gdim);
     for (const SmallMatrix* matrix : {&metric.sum, &metric.damped_inverse})
       for (int a = 0; a < gdim; ++a)
         for (int c = a; c < gdim; ++c) blend.metrics.push_back(static_cast<Scalar>((*matrix)(a, c)));
+    blend.caution.push_back(static_cast<Scalar>(given.caution[r]));
   }
 }
 
@@ -332,11 +333,11 @@ void Interpolant<Scalar>::Binding::count_bytes() {
         any);
   report.bytes += bytes(weighted.first) + bytes(weighted.nodes) + bytes(weighted.coefficients) + bytes(weighted.beta);
   report.bytes += bytes(vertices) + bytes(permutation) + bytes(position);
-  for (const Stencils* rows : {&stencils, &blend.averaging, &blend.probing})
+  for (const Stencils* rows : {&stencils, &blend.averaging})
     report.bytes += bytes(rows->first_group) + bytes(rows->neighbors) + bytes(rows->weights);
-  report.bytes += bytes(blend.edges) + bytes(blend.metrics);
+  report.bytes += bytes(blend.edges) + bytes(blend.metrics) + bytes(blend.caution);
   if (blended)
-    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging, &blended->blend->probing})
+    for (const GradientStencilTable* table : {&blended->stencils, &blended->blend->averaging, &blended->blend->beyond})
       report.bytes += bytes(table->offsets) + bytes(table->neighbors) + bytes(table->weights);
 }
 
@@ -397,7 +398,7 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
     pack_runs<Runs, Scalar>(mesh, embedding, order, members, numbers.empty() ? number : part_number, outside_row, runs,
                             binding->permutation.data() + base);
     if constexpr (E::affine)
-      if (rule.needs_gradients() && !rule.needs_hessians())
+      if (rule.needs_gradients())
         runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run, int i, int j) -> Vector {
           const std::span<const Index> vertices = mesh.cell_vertices(order.cells[members[run]]);
           return (mesh.vertices().row(vertices[j]) - mesh.vertices().row(vertices[i])).transpose();

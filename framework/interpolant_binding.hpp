@@ -69,19 +69,18 @@ struct Interpolant<Scalar>::Binding {
     std::vector<Index> neighbors;
     std::vector<Scalar> weights;
 
+    Index num_rows() const { return static_cast<Index>(first_group.size() - 1); }
     Offset begin(Offset row) const { return 4 * first_group[row]; }
     Offset end(Offset row) const { return 4 * first_group[row + 1]; }
     Offset place(Offset entry, int k) const { return 4 * (entry / 4 * width + k) + entry % 4; }
     Scalar weight(Offset entry, int k) const { return weights[place(entry, k)]; }
   };
 
-  // A blend for the fast path; its main table is `stencils`. Rows of `probing` are the active vertices and those
-  // that follow them in the numbering.
+  // A blend for the fast path. `stencils` then has rows of the active vertices' neighbours too, which follow them in the
+  // numbering.
   struct Blend {
-    Stencils averaging, probing;
-    std::vector<Scalar> edges, metrics;  // kernels/blend_stage.hpp
-
-    Index num_probing() const { return static_cast<Index>(probing.first_group.size() - 1); }
+    Stencils averaging;
+    std::vector<Scalar> edges, metrics, caution;  // kernels/blend_stage.hpp
   };
 
   // Points given by their weights: what a point reads of each vertex, a | c_1 … c_d | (q_11 …), and β apart.

@@ -46,22 +46,19 @@ Reconstruction Adaptive::reconstruct(const CellGradients& cells, std::span<const
     }
     first_pair.push_back(static_cast<Offset>(pairs.size()));
   }
-  const GradientStencilTable lean = Kriging({.patch = KrigingPatch::lean}).reconstruct(cells, rows).stencils;
-  Reconstruction result = Kriging().reconstruct(cells, vertices);
 
+  Reconstruction result = Kriging().reconstruct(cells, rows);
+  const std::vector<StencilDiagnostics> diagnostics = result.stencils.diagnostics;
   AdaptiveBlend blend;
-  blend.prediction_share = 0.25;
+  blend.prediction_share = 1.0 / 3;
   blend.averaging = ChandrashekarGarg().reconstruct(cells, vertices).stencils;
-  blend.probing.gdim = gdim;
-  for (Index r = 0; r < lean.num_rows(); ++r) {
-    const bool own = static_cast<std::size_t>(r) < vertices.size();
-    append_row(own && !is_sound(lean.diagnostics[r]) ? result.stencils : lean, r, blend.probing);
-  }
+  blend.beyond = split_rows(result.stencils, static_cast<Index>(vertices.size()));
   for (std::size_t r = 0; r < vertices.size(); ++r) {
+    blend.caution.push_back(static_cast<double>(diagnostics[r].absolute_sum) / 5.5);
     for (Offset pair = first_pair[r]; pair < first_pair[r + 1]; ++pair) {
       const Index other = pairs[pair];
       const Vector edge = (cells.vertices().row(rows[other]) - cells.vertices().row(vertices[r])).transpose();
-      if (!(edge.squaredNorm() > 0) || !is_sound(lean.diagnostics[other]) || !is_sound(lean.diagnostics[r])) continue;
+      if (!(edge.squaredNorm() > 0) || !is_sound(diagnostics[other]) || !is_sound(diagnostics[r])) continue;
       blend.edge_rows.push_back(other);
       blend.edges.insert(blend.edges.end(), edge.data(), edge.data() + gdim);
     }

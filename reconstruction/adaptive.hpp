@@ -6,12 +6,13 @@
 namespace halfgrad {
 
 /// Chandrashekar–Garg gradients, and wide kriging gradients with a share of what the neighbours predict, blended a
-/// vertex and a frame at a time by how well each goes with lean kriging gradients of the neighbours along the edges:
+/// vertex and a frame at a time by how well each goes with the kriging gradients of the neighbours along the edges:
 /// kriging where the mesh resolves the field, averaging where it does not (docs/adaptive.md). The blend takes place in
 /// blended_gradients().
 class Adaptive final : public VertexGradientReconstructor {
  public:
   Reconstruction reconstruct(const CellGradients& cells, std::span<const Index> vertices) const override;
 };
+
 
 }  // namespace halfgrad

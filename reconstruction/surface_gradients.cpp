@@ -143,22 +143,24 @@ Reconstruction surface_gradients(const VertexGradientReconstructor& reconstructo
                                  std::span<const Index> vertices) {
   const Patches patches(surface);
   std::vector<Index> wanted(vertices.begin(), vertices.end());
-  std::vector<StencilRow> rows, averaging, probing;
+  std::vector<StencilRow> rows, averaging;
+  std::vector<double> caution;
   // Rows of wanted[first …]; whether any of them is a blend.
   const auto make_rows = [&](std::size_t first) {
-    for (std::vector<StencilRow>* table : {&rows, &averaging, &probing}) table->resize(wanted.size());
+    for (std::vector<StencilRow>* table : {&rows, &averaging}) table->resize(wanted.size());
+    caution.resize(wanted.size(), 0);
     std::vector<char> has_blend(wanted.size(), 0);
     parallel_for(static_cast<std::int64_t>(wanted.size() - first), 16, [&](std::int64_t begin, std::int64_t end) {
       Patch patch;
       for (std::size_t r = first + static_cast<std::size_t>(begin); r < first + static_cast<std::size_t>(end); ++r) {
-        rows[r].diagnostics.rule = averaging[r].diagnostics.rule = probing[r].diagnostics.rule = StencilRule::none;
+        rows[r].diagnostics.rule = averaging[r].diagnostics.rule = StencilRule::none;
         if (!patches.make(wanted[r], patch)) continue;
         const std::array<Index, 1> center = {0};
         const Reconstruction flat = reconstructor.reconstruct(CellGradients(patch.mesh), center);
         lift_row(surface, patch, flat.stencils, rows[r]);
         if (!flat.blend) continue;
         lift_row(surface, patch, flat.blend->averaging, averaging[r]);
-        lift_row(surface, patch, flat.blend->probing, probing[r]);
+        caution[r] = flat.blend->caution[0];
         has_blend[r] = 1;
       }
     });
@@ -167,8 +169,10 @@ Reconstruction surface_gradients(const VertexGradientReconstructor& reconstructo
   const bool blended = make_rows(0);
 
   Reconstruction result;
-  result.stencils = table_of(wanted, rows);
-  if (!blended) return result;
+  if (!blended) {
+    result.stencils = table_of(wanted, rows);
+    return result;
+  }
   // The edges to the neighbours are tested with rows of theirs. The prediction takes no share: it would take an edge's
   // part along the normal for a mismatch of the gradients, and spoil the rest shape.
   AdaptiveBlend blend;
@@ -195,7 +199,9 @@ Reconstruction surface_gradients(const VertexGradientReconstructor& reconstructo
     blend.edge_offsets.push_back(static_cast<Offset>(blend.edge_rows.size()));
   }
   make_rows(vertices.size());
-  blend.probing = table_of(wanted, probing);
+  result.stencils = table_of(wanted, rows);
+  blend.beyond = split_rows(result.stencils, static_cast<Index>(vertices.size()));
+  blend.caution.assign(caution.begin(), caution.begin() + result.stencils.num_rows());
   result.blend = std::move(blend);
   return result;
 }

@@ -18,7 +18,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the tables of .hgb files are little-endian");
 
-constexpr int format_version = 3;
+constexpr int format_version = 4;
 
 // Tables are byte strings of their numbers as they stand in memory.
 template <class T>
@@ -223,9 +223,13 @@ json write_reconstruction(const Reconstruction& reconstruction) {
   json result = {{"stencils", write_table(reconstruction.stencils)}};
   if (reconstruction.blend) {
     const AdaptiveBlend& blend = *reconstruction.blend;
-    result["blend"] = {{"averaging", write_table(blend.averaging)},  {"probing", write_table(blend.probing)},
-                       {"prediction_share", blend.prediction_share}, {"edge_offsets", packed(blend.edge_offsets)},
-                       {"edge_rows", packed(blend.edge_rows)},       {"edges", packed(blend.edges)}};
+    result["blend"] = {{"averaging", write_table(blend.averaging)},
+                       {"beyond", write_table(blend.beyond)},
+                       {"prediction_share", blend.prediction_share},
+                       {"caution", packed(blend.caution)},
+                       {"edge_offsets", packed(blend.edge_offsets)},
+                       {"edge_rows", packed(blend.edge_rows)},
+                       {"edges", packed(blend.edges)}};
   }
   return result;
 }
@@ -238,16 +242,15 @@ Reconstruction read_reconstruction(const TableReader& in, const json& object, co
   AdaptiveBlend blend;
   blend.averaging = read_table(from.object("averaging"), sizes);
   if (blend.averaging.vertices != result.stencils.vertices) from.fail("its two tables have other rows");
-  blend.probing = read_table(from.object("probing"), sizes);
+  blend.beyond = read_table(from.object("beyond"), sizes);
+  if (blend.beyond.has_hessians() != result.stencils.has_hessians()) from.fail("its fitted rows differ in kind");
   const std::vector<Index>& rows = result.stencils.vertices;
-  if (blend.probing.vertices.size() < rows.size() ||
-      !std::equal(rows.begin(), rows.end(), blend.probing.vertices.begin()))
-    from.fail("the edges are tested with other rows");
   const json& share = from.at("prediction_share");
   if (!share.is_number() || !(share >= 0) || !(share <= 1)) from.fail("\"prediction_share\"");
   blend.prediction_share = share;
+  blend.caution = from.weights("caution", rows.size());
   blend.edge_rows = from.table<Index>("edge_rows");
-  from.check_range("edge_rows", blend.edge_rows, 0, blend.probing.num_rows());
+  from.check_range("edge_rows", blend.edge_rows, 0, result.stencils.num_rows() + blend.beyond.num_rows());
   blend.edge_offsets = from.offsets("edge_offsets", rows.size(), blend.edge_rows.size());
   blend.edges = from.weights("edges", static_cast<std::size_t>(sizes.gdim) * blend.edge_rows.size());
   result.blend = std::move(blend);

@@ -13,14 +13,14 @@ template <class Scalar>
 struct BlendStage {
   int dim;
   const Offset* edge_offsets;  ///< [row]
-  const Index* edge_rows;      ///< [edge] row of `probing`
-  const Scalar* edges;         ///< [edge] 2 / |e|, e / |e|
+  const Index* edge_rows;      ///< [edge] row of `fitted`
+  const Scalar* edges;         ///< [edge] 2 |e|^(−3/2), −ê
   const Scalar* metrics;       ///< [row] Σ êêᵀ and its damped inverse, num_symmetric(dim) numbers each
-  const Scalar* averaging;     ///< lines
-  const Scalar* probing;       ///< lines of the rows and of their neighbours
+  const Scalar* caution;       ///< [row]
+  const Scalar* fitted;        ///< lines of the rows and of their neighbours
   Scalar prediction_share;
   std::array<Scalar, 9> scale;  ///< of the result, as in VertexStage
-  Scalar* lines;                ///< holds the main table's lines; the results take their place
+  Scalar* lines;                ///< holds the averages' lines; the results take their place
 
   /// Rows [begin, end) by the fastest instructions of this machine.
   void run(Index begin, Index end) const;

@@ -98,6 +98,15 @@ HWY_INLINE Four<T> product(const Four<T>* column, const T* factor) {
   return sum;
 }
 
+#if HWY_TARGET == HWY_AVX3
+// The sums of the four blocks of a, b, c and d, in one block each.
+HWY_INLINE __m512 transposed_sum(__m512 a, __m512 b, __m512 c, __m512 d) {
+  const __m512 ab = _mm512_add_ps(_mm512_shuffle_f32x4(a, b, 0x44), _mm512_shuffle_f32x4(a, b, 0xee));
+  const __m512 cd = _mm512_add_ps(_mm512_shuffle_f32x4(c, d, 0x44), _mm512_shuffle_f32x4(c, d, 0xee));
+  return _mm512_add_ps(_mm512_shuffle_f32x4(ab, cd, 0x88), _mm512_shuffle_f32x4(ab, cd, 0xdd));
+}
+#endif
+
 }  // namespace halfgrad::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif

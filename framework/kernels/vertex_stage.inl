@@ -39,12 +39,6 @@ void vertex_lines(const VertexStage<T>& stage, Index begin, Index end) {
 //   | x_a − x_v | x_b − x_v | x_c − x_v | x_d − x_v |
 // times their weights k, so that an entry takes half the permutations of one vector an entry. The blocks of the sums
 // are added at the end of a row.
-HWY_INLINE __m512 transposed_sum(__m512 a, __m512 b, __m512 c, __m512 d) {
-  const __m512 ab = _mm512_add_ps(_mm512_shuffle_f32x4(a, b, 0x44), _mm512_shuffle_f32x4(a, b, 0xee));
-  const __m512 cd = _mm512_add_ps(_mm512_shuffle_f32x4(c, d, 0x44), _mm512_shuffle_f32x4(c, d, 0xee));
-  return _mm512_add_ps(_mm512_shuffle_f32x4(ab, cd, 0x88), _mm512_shuffle_f32x4(ab, cd, 0xdd));
-}
-
 template <int width>
 void vertex_lines_in_blocks(const VertexStage<float>& given, Index begin, Index end) {
   constexpr int num_fours = 1 + width, num_vectors = (num_fours + 3) / 4,
