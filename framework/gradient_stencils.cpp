@@ -93,9 +93,10 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
         const Vector edge = weighted_edge(blend, e, gdim);
         load(fitted, row, other);
         // |e|^(−3/2) = |ê|³
-        mismatch = 2 * std::pow(edge.norm(), 3) *
-                       (values.row(rows.vertices[row]) - values.row(table.vertices[r])).transpose().template cast<double>() -
-                   (fit + other) * edge;
+        mismatch =
+            2 * std::pow(edge.norm(), 3) *
+                (values.row(rows.vertices[row]) - values.row(table.vertices[r])).transpose().template cast<double>() -
+            (fit + other) * edge;
         squares += mismatch.squaredNorm();
         moment += mismatch * edge.transpose();
       }

@@ -398,7 +398,7 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
     pack_runs<Runs, Scalar>(mesh, embedding, order, members, numbers.empty() ? number : part_number, outside_row, runs,
                             binding->permutation.data() + base);
     if constexpr (E::affine)
-      if (rule.needs_gradients())
+      if (rule.needs_gradients() && !rule.needs_hessians())
         runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run, int i, int j) -> Vector {
           const std::span<const Index> vertices = mesh.cell_vertices(order.cells[members[run]]);
           return (mesh.vertices().row(vertices[j]) - mesh.vertices().row(vertices[i])).transpose();

@@ -76,8 +76,8 @@ struct Interpolant<Scalar>::Binding {
     Scalar weight(Offset entry, int k) const { return weights[place(entry, k)]; }
   };
 
-  // A blend for the fast path. `stencils` then has rows of the active vertices' neighbours too, which follow them in the
-  // numbering.
+  // A blend for the fast path. `stencils` then has rows of the active vertices' neighbours too, which follow them in
+  // the numbering.
   struct Blend {
     Stencils averaging;
     std::vector<Scalar> edges, metrics, caution;  // kernels/blend_stage.hpp

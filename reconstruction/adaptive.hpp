@@ -14,5 +14,4 @@ class Adaptive final : public VertexGradientReconstructor {
   Reconstruction reconstruct(const CellGradients& cells, std::span<const Index> vertices) const override;
 };
 
-
 }  // namespace halfgrad

@@ -89,14 +89,10 @@ void blend_lines(const BlendStage<T>& stage, Index begin, Index end) {
 }
 
 #if HWY_TARGET == HWY_AVX3
-// The same in three dimensions with a line in one vector, | x | F_1 | F_2 | F_3 |, so that an edge takes one load and one
-// product.
+// The same in three dimensions with a line in one vector, | x | F_1 | F_2 | F_3 |, or along the edges in two.
 template <int d>
-void blend_lines(const BlendStage<float>& given, Index begin, Index end)
-  requires(d == 3)
-{
+void blend_lines(const BlendStage<float>& given, Index begin, Index end) requires(d == 3) {
   const BlendStage<float> stage = given;
-  const __m512i each_four = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
   constexpr __mmask16 first = 0x000f, rest = 0xfff0;
   // Columns of a matrix, given as its upper triangle, in the last three blocks.
   const __m512i column[3] = {_mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2),
@@ -114,29 +110,42 @@ void blend_lines(const BlendStage<float>& given, Index begin, Index end)
                                       stage.scale[1], stage.scale[1], stage.scale[1], stage.scale[1], stage.scale[2],
                                       stage.scale[2], stage.scale[2], stage.scale[2]);
   const __m512 share = _mm512_set1_ps(stage.prediction_share);
+  // | Σ m² | −Σ m ê_1 | −Σ m ê_2 | −Σ m ê_3 | of some rows, before what follows from them: a row's chain of operations
+  // is longer than what the processor looks ahead.
+  constexpr Index rows_ahead = 16;
+  HWY_ALIGN float sums_of_rows[16 * rows_ahead];
+  const __m256i each_four_low = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1),
+                each_four_high = _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3);
+  const auto sum_edges = [&](Index row, float* to) HWY_ATTR {
+    const float* const own = stage.fitted + 16 * static_cast<Offset>(row);
+    const __m256 own_low = _mm256_load_ps(own), own_high = _mm256_load_ps(own + 8);
+    const __m256 signed_low = _mm256_mask_sub_ps(own_low, 0x0f, _mm256_setzero_ps(), own_low);
+    __m256 low = _mm256_setzero_ps(), high = _mm256_setzero_ps();
+    const Index* const last = stage.edge_rows + stage.edge_offsets[row + 1];
+    const float* edge = stage.edges + 4 * stage.edge_offsets[row];
+    for (const Index* other_row = stage.edge_rows + stage.edge_offsets[row]; other_row != last;
+         ++other_row, edge += 4) {
+      const float* const other = stage.fitted + 16 * static_cast<Offset>(*other_row);
+      const __m256 factors = _mm256_castps128_ps256(_mm_loadu_ps(edge));
+      const __m256 factors_low = _mm256_permutevar8x32_ps(factors, each_four_low),
+                   factors_high = _mm256_permutevar8x32_ps(factors, each_four_high);
+      const __m256 terms =
+          _mm256_fmadd_ps(_mm256_add_ps(_mm256_load_ps(other + 8), own_high), factors_high,
+                          _mm256_mul_ps(_mm256_add_ps(_mm256_load_ps(other), signed_low), factors_low));
+      const __m256 mismatch = _mm256_add_ps(terms, _mm256_permute2f128_ps(terms, terms, 1));
+      low = _mm256_fmadd_ps(mismatch, _mm256_blend_ps(factors_low, mismatch, 0x0f), low);
+      high = _mm256_fmadd_ps(mismatch, factors_high, high);
+    }
+    _mm256_store_ps(to, low);
+    _mm256_store_ps(to + 8, high);
+  };
   for (Index row = begin; row < end; ++row) {
+    const Index place = (row - begin) % rows_ahead;
+    if (place == 0)
+      for (Index r = row; r < std::min(row + rows_ahead, end); ++r) sum_edges(r, sums_of_rows + 16 * (r - row));
+    const __m512 sum = _mm512_load_ps(sums_of_rows + 16 * place);
     const __m512 own = _mm512_load_ps(stage.fitted + 16 * static_cast<Offset>(row));
     const __m512 fit = _mm512_maskz_mov_ps(rest, own);
-    const __m512 signed_own = _mm512_mask_sub_ps(own, first, _mm512_setzero_ps(), own);
-    // | Σ m² | −Σ m ê_1 | −Σ m ê_2 | −Σ m ê_3 |
-    __m512 sums[2] = {_mm512_setzero_ps(), _mm512_setzero_ps()};
-    const auto add_edge = [&](Offset e, __m512& sum) HWY_ATTR {
-      const __m512 other = _mm512_load_ps(stage.fitted + 16 * static_cast<Offset>(stage.edge_rows[e]));
-      const __m512 factors =
-          _mm512_permutexvar_ps(each_four, _mm512_castps128_ps512(_mm_loadu_ps(stage.edges + 4 * e)));
-      const __m512 terms = _mm512_mul_ps(_mm512_add_ps(other, signed_own), factors);
-      const __m512 halves = _mm512_add_ps(terms, _mm512_shuffle_f32x4(terms, terms, 0x4e));
-      const __m512 mismatch = _mm512_add_ps(halves, _mm512_shuffle_f32x4(halves, halves, 0xb1));
-      sum = _mm512_fmadd_ps(mismatch, _mm512_mask_mov_ps(factors, first, mismatch), sum);
-    };
-    Offset e = stage.edge_offsets[row];
-    const Offset edge_end = stage.edge_offsets[row + 1];
-    for (; e + 1 < edge_end; e += 2) {
-      add_edge(e, sums[0]);
-      add_edge(e + 1, sums[1]);
-    }
-    if (e < edge_end) add_edge(e, sums[0]);
-    const __m512 sum = _mm512_add_ps(sums[0], sums[1]);
 
     // Entries 0 … 5 of a vector are the sum Σ êêᵀ, then those of its damped inverse.
     const float* const metric = stage.metrics + 12 * static_cast<Offset>(row);
@@ -147,15 +156,14 @@ void blend_lines(const BlendStage<float>& given, Index begin, Index end)
     const __m512 change = _mm512_maskz_sub_ps(rest, average, own);
     const __m512 squares = _mm512_maskz_mov_ps(first, sum);
     const __m512 predicted = _mm512_maskz_mul_ps(rest, correction, sum);
-    const __m512 averaged = _mm512_maskz_mul_ps(
-        rest, change, _mm512_fmadd_ps(sum, _mm512_set1_ps(2), product(matrix, change)));
+    const __m512 averaged =
+        _mm512_maskz_mul_ps(rest, change, _mm512_fmadd_ps(sum, _mm512_set1_ps(2), product(matrix, change)));
     const __m512 totals = transposed_sum(squares, predicted, averaged, _mm512_mul_ps(fit, fit));
     const __m512 pairs = _mm512_add_ps(totals, _mm512_permute_ps(totals, 0xb1));
     alignas(64) float total[16];
     _mm512_store_ps(total, _mm512_add_ps(pairs, _mm512_permute_ps(pairs, 0x4e)));
-    const float weight =
-        fitted_weight(total[0], total[0] + total[4], std::max(0.0f, total[0] + total[8]),
-                      4 * (metric[0] + metric[3] + metric[5]) * total[12], stage.caution[row]);
+    const float weight = fitted_weight(total[0], total[0] + total[4], std::max(0.0f, total[0] + total[8]),
+                                       4 * (metric[0] + metric[3] + metric[5]) * total[12], stage.caution[row]);
     const __m512 wanted = _mm512_fmsub_ps(share, correction, change);
     _mm512_store_ps(line, _mm512_mul_ps(_mm512_fmadd_ps(_mm512_set1_ps(weight), wanted, average), scale));
   }
