@@ -43,17 +43,27 @@ Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const V
   return apply_weights(table, table.hessian_weights, num_symmetric(table.gdim), values);
 }
 
-Vector weighted_edge(const AdaptiveBlend& blend, Offset edge, int gdim) {
-  const Eigen::Map<const Eigen::VectorXd> along(blend.edges.data() + edge * gdim, gdim);
-  return along / std::pow(along.norm(), 1.5);
+std::vector<WeightedEdge> weighted_edges(const AdaptiveBlend& blend, Index row, int gdim) {
+  std::vector<WeightedEdge> result;
+  double mean = 0;
+  for (Offset e = blend.edge_offsets[row]; e < blend.edge_offsets[row + 1]; ++e) {
+    const Eigen::Map<const Eigen::VectorXd> edge(blend.edges.data() + e * gdim, gdim);
+    const double length = edge.stableNorm();
+    result.push_back({edge / length, 1 / length});
+    mean += length;
+  }
+  mean /= static_cast<double>(std::max<std::size_t>(1, result.size()));
+  for (WeightedEdge& edge : result) {
+    const double weight = std::sqrt(mean * edge.per_length);
+    edge.along *= weight;
+    edge.per_length *= weight;
+  }
+  return result;
 }
 
-EdgeMetric edge_metric(const AdaptiveBlend& blend, Index row, int gdim) {
+EdgeMetric edge_metric(std::span<const WeightedEdge> edges, int gdim) {
   EdgeMetric result{SmallMatrix::Zero(gdim, gdim), SmallMatrix::Zero(gdim, gdim)};
-  for (Offset e = blend.edge_offsets[row]; e < blend.edge_offsets[row + 1]; ++e) {
-    const Vector edge = weighted_edge(blend, e, gdim);
-    result.sum += edge * edge.transpose();
-  }
+  for (const WeightedEdge& edge : edges) result.sum += edge.along * edge.along.transpose();
   const double mean = result.sum.trace() / gdim;
   if (mean > 0) result.damped_inverse = (result.sum + 0.1 * mean * SmallMatrix::Identity(gdim, gdim)).inverse();
   return result;
@@ -88,19 +98,19 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
       // The mismatches m of the fitted gradient: their squares and Σ m êᵀ tell those of every other gradient.
       double squares = 0;
       moment = Eigen::MatrixXd::Zero(columns, gdim);
-      for (Offset e = blend.edge_offsets[r]; e < blend.edge_offsets[r + 1]; ++e) {
-        const Index row = blend.edge_rows[e];
-        const Vector edge = weighted_edge(blend, e, gdim);
-        load(fitted, row, other);
-        // |e|^(−3/2) = |ê|³
+      const std::vector<WeightedEdge> edges = weighted_edges(blend, r, gdim);
+      const Index* edge_row = blend.edge_rows.data() + blend.edge_offsets[r];
+      for (const WeightedEdge& edge : edges) {
+        load(fitted, *edge_row, other);
         mismatch =
-            2 * std::pow(edge.norm(), 3) *
-                (values.row(rows.vertices[row]) - values.row(table.vertices[r])).transpose().template cast<double>() -
-            (fit + other) * edge;
+            2 * edge.per_length *
+            (values.row(rows.vertices[*edge_row]) - values.row(table.vertices[r])).transpose().template cast<double>();
+        mismatch -= (fit + other) * edge.along;
         squares += mismatch.squaredNorm();
-        moment += mismatch * edge.transpose();
+        moment += mismatch * edge.along.transpose();
+        ++edge_row;
       }
-      const EdgeMetric metric = edge_metric(blend, r, gdim);
+      const EdgeMetric metric = edge_metric(edges, gdim);
       const Eigen::MatrixXd correction = moment * metric.damped_inverse, change = average - fit;
       const double predicted = squares - correction.cwiseProduct(moment).sum();
       const double averaged = squares + (change * metric.sum - 2 * moment).cwiseProduct(change).sum();
@@ -116,7 +126,7 @@ Values<Scalar> blended_gradients(const Reconstruction& reconstruction, const Val
 }
 
 void drop_short_edges(AdaptiveBlend& blend, double shortest) {
-  const auto gdim = static_cast<Offset>(blend.probing.gdim);
+  const auto gdim = static_cast<Offset>(blend.averaging.gdim);
   Offset kept = 0, begin = 0;
   for (std::size_t r = 1; r < blend.edge_offsets.size(); ++r) {
     const Offset end = blend.edge_offsets[r];

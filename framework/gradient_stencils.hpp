@@ -62,15 +62,20 @@ struct AdaptiveBlend {
 /// Leaves out the edges that are shorter than a length.
 void drop_short_edges(AdaptiveBlend& blend, double shortest);
 
-/// e / |e|^(3/2), what mismatches along an edge are weighted by (docs/adaptive.md).
-Vector weighted_edge(const AdaptiveBlend& blend, Offset edge, int gdim);
+/// An edge as mismatches are measured along it: ê = e / |e| · sqrt(h / |e|) with the mean length h of the vertex's
+/// edges.
+struct WeightedEdge {
+  Vector along;       ///< ê
+  double per_length;  ///< |ê| / |e|
+};
+std::vector<WeightedEdge> weighted_edges(const AdaptiveBlend& blend, Index row, int gdim);
 
-/// The edges of one vertex as a metric of gradients: Σ êêᵀ, ê = e / |e|^(3/2), and the inverse of that sum plus a tenth
-/// of its mean eigenvalue, which stays bounded where the edges hardly span the space. Zero where the vertex has none.
+/// The edges of one vertex as a metric of gradients: Σ êêᵀ, and the inverse of that sum plus a tenth of its mean
+/// eigenvalue, which stays bounded where the edges hardly span the space. Zero where the vertex has no edges.
 struct EdgeMetric {
   SmallMatrix sum, damped_inverse;  ///< gdim × gdim
 };
-EdgeMetric edge_metric(const AdaptiveBlend& blend, Index row, int gdim);
+EdgeMetric edge_metric(std::span<const WeightedEdge> edges, int gdim);
 
 /// The weight of the fitted gradient, 1 / (1 + r⁶) of r = caution · sqrt(fitted · predicted) / averaged, the mismatches
 /// of the fitted gradient, of the best that its neighbours leave room for, and of the averaged one. `squares` are those
@@ -107,8 +112,9 @@ template <class Scalar>
 Values<Scalar> apply_hessian_stencils(const GradientStencilTable& table, const Values<Scalar>& values);
 
 /// Gradients under a blend (reconstructor `adaptive`), #rows × (#columns · gdim). With F_c and F_k the gradients of
-/// `averaging` and of the main table, ê = e / |e|^(3/2), the mismatch of a gradient F at v with its neighbours is
-///   E(F) = Σ over edges e of |2 (x_j − x_v) |e|^(−3/2) − (F + F_k,j) ê|²,
+/// `averaging` and of the main table and the edges ê as WeightedEdge has them, the mismatch of a gradient F at v with
+/// its neighbours is
+///   E(F) = Σ over edges e of |2 (x_j − x_v) |ê| / |e| − (F + F_k,j) ê|²,
 /// P = F_k + Σ m êᵀ · damped_inverse (m the mismatches of F_k) is the neighbours' prediction, and
 ///   F = F_c + w (F_s − F_c),  F_s = F_k + share (P − F_k),
 ///   w = fitted_weight(E(F_k), E(F_k) − Σ m êᵀ · (P − F_k), E(F_c), 4 Σ |ê|² |F_k|², caution).

@@ -305,13 +305,13 @@ void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
   pack_stencils(rows, false, rows.num_rows(), vertices, number, stencils);
   pack_stencils(given.averaging, false, num_active, vertices, number, blend.averaging);
   report.num_stencil_entries += given.beyond.num_entries() + given.averaging.num_entries();
-  for (Offset e = 0; e < static_cast<Offset>(given.edge_rows.size()); ++e) {
-    const Vector edge = weighted_edge(given, e, gdim);
-    blend.edges.push_back(static_cast<Scalar>(2 * std::pow(edge.norm(), 3)));
-    for (int a = 0; a < gdim; ++a) blend.edges.push_back(static_cast<Scalar>(-edge[a]));
-  }
   for (Index r = 0; r < num_active; ++r) {
-    const EdgeMetric metric = edge_metric(given, r, gdim);
+    const std::vector<WeightedEdge> edges = weighted_edges(given, r, gdim);
+    for (const WeightedEdge& edge : edges) {
+      blend.edges.push_back(static_cast<Scalar>(2 * edge.per_length));
+      for (int a = 0; a < gdim; ++a) blend.edges.push_back(static_cast<Scalar>(-edge.along[a]));
+    }
+    const EdgeMetric metric = edge_metric(edges, gdim);
     for (const SmallMatrix* matrix : {&metric.sum, &metric.damped_inverse})
       for (int a = 0; a < gdim; ++a)
         for (int c = a; c < gdim; ++c) blend.metrics.push_back(static_cast<Scalar>((*matrix)(a, c)));

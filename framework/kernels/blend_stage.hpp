@@ -14,7 +14,7 @@ struct BlendStage {
   int dim;
   const Offset* edge_offsets;  ///< [row]
   const Index* edge_rows;      ///< [edge] row of `fitted`
-  const Scalar* edges;         ///< [edge] 2 |e|^(−3/2), −ê
+  const Scalar* edges;         ///< [edge] 2 |ê| / |e|, −ê (WeightedEdge)
   const Scalar* metrics;       ///< [row] Σ êêᵀ and its damped inverse, num_symmetric(dim) numbers each
   const Scalar* caution;       ///< [row]
   const Scalar* fitted;        ///< lines of the rows and of their neighbours
