@@ -178,7 +178,7 @@ Rows CaseRunner::make_rows(const StressReconstructor& made) {
   measure(table);
   if (rows.blended()) {
     measure(rows.reconstruction.blend->averaging);
-    measure(rows.reconstruction.blend->probing);
+    measure(rows.reconstruction.blend->beyond);
   }
   rows.noise = reference_gradients(table, {}, noise_);
   rows.affine = reference_gradients(table, rows.magnitudes, affine_);
