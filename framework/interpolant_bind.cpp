@@ -3,6 +3,7 @@
 
 #include "framework/grid.hpp"
 #include "framework/interpolant_binding.hpp"
+#include "framework/large_array.hpp"
 
 namespace halfgrad {
 
@@ -46,7 +47,9 @@ struct CodedCell {
 // Sorts by code; cells of one code keep their order.
 void sort_by_code(std::vector<CodedCell>& cells) {
   constexpr int bits = 11, mask = (1 << bits) - 1;
-  std::vector<CodedCell> sorted(cells.size());
+  std::vector<CodedCell> sorted;
+  reserve_large(sorted, cells.size());
+  sorted.resize(cells.size());
   for (int shift = 0; shift < 32; shift += bits) {
     std::array<Index, mask + 2> next{};
     for (const CodedCell& cell : cells) ++next[(cell.code >> shift & mask) + 1];
@@ -65,9 +68,11 @@ struct CellOrder {
 
 CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
   std::vector<Index> count(static_cast<std::size_t>(mesh.num_cells()), 0);
+  Index num_active = 0;
   for (Index cell : embedding.cells)
-    if (cell >= 0) ++count[cell];
+    if (cell >= 0) num_active += count[cell]++ == 0;
   std::vector<CodedCell> coded;
+  reserve_large(coded, static_cast<std::size_t>(num_active));
   if (mesh.num_cells() > 0) {
     const MortonCode code(mesh.vertices());
     for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
@@ -398,9 +403,10 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
                             binding->permutation.data() + base);
     if constexpr (E::affine)
       if (rule.needs_gradients() && !rule.needs_hessians())
-        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run, int i, int j) -> Vector {
+        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run, int i, int j) -> ReferencePoint<E> {
           const std::span<const Index> vertices = mesh.cell_vertices(order.cells[members[run]]);
-          return (mesh.vertices().row(vertices[j]) - mesh.vertices().row(vertices[i])).transpose();
+          const auto position = [&](int node) { return mesh.vertices().row(vertices[node]).template head<E::dim>(); };
+          return (position(j) - position(i)).transpose();
         });
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));
