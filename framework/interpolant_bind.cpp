@@ -93,7 +93,6 @@ CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
     order.first_point.push_back(begin + count[each.cell]);
     count[each.cell] = begin;  // now where the cell's next point goes
   }
-  reserve_large(order.points, static_cast<std::size_t>(order.first_point.back()));
   order.points.resize(static_cast<std::size_t>(order.first_point.back()));
   for (Index p = 0; p < embedding.num_points(); ++p)
     if (embedding.cells[p] >= 0) order.points[count[embedding.cells[p]]++] = p;
@@ -131,7 +130,6 @@ namespace {
 std::vector<Index> inverse_unless_identity(const std::vector<Index>& permutation) {
   std::vector<Index> inverse;
   if (std::is_sorted(permutation.begin(), permutation.end())) return inverse;
-  reserve_large(inverse, permutation.size());
   inverse.resize(permutation.size());
   for (std::size_t s = 0; s < permutation.size(); ++s) inverse[permutation[s]] = static_cast<Index>(s);
   return inverse;
@@ -192,7 +190,6 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
   for (std::size_t r = 0; r < num_runs; ++r)
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
   const auto num_points = static_cast<std::size_t>(runs.first.back());
-  reserve_large(runs.local, num_points * d + kernels::vector_padding);
   runs.local.assign(num_points * d + kernels::vector_padding, Scalar(0));
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
@@ -384,7 +381,6 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
   }
 
   const std::vector<Index> outside_row = outside_rows(embedding);
-  reserve_large(binding->permutation, embedding.cells.size());
   binding->permutation.resize(embedding.cells.size());
   Index base = 0;
   Elements::for_each([&]<class E>() {
