@@ -1,17 +1,18 @@
-// bind_bench WORKLOAD ROUNDS MAX_POINTS [THREADS]: times location, bind and the parts of bind with the reconstructor
-// chandrashekar_garg, one JSON line each. Every round runs each operation once in turn; compare numbers of one round
-// only. The line `report` has the size of the binding, and how much the first bind added to the process at its peak.
+// bind_bench WORKLOAD ROUNDS MAX_POINTS [THREADS]: times location, bind, the parts of bind with the reconstructor
+// chandrashekar_garg and a frame of phong, one JSON line each. Every round runs each operation once in turn, the frame
+// several times, of which the fastest counts; compare numbers of one round only. The line `report` has the size of the
+// binding, and how much the first bind added to the process at its peak.
 #include <fmt/format.h>
-#include <malloc.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <string>
 #include <utility>
 
+#include "benchmarks/peak_memory.hpp"
 #include "benchmarks/workload.hpp"
 #include "framework/cell_locator.hpp"
 #include "framework/error.hpp"
@@ -20,14 +21,6 @@
 
 namespace halfgrad::benchmarks {
 namespace {
-
-// A size of the process in bytes; 0 where the system does not tell.
-std::int64_t process_bytes(const std::string& name) {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with(name)) return 1024 * std::atoll(line.c_str() + name.size());
-  return 0;
-}
 
 class Stopwatch {
  public:
@@ -66,11 +59,9 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
     return interpolant;
   };
 
-  malloc_trim(0);
-  std::ofstream("/proc/self/clear_refs") << 5 << std::endl;  // the peak starts anew
-  const std::int64_t before = process_bytes("VmRSS:");
+  const PeakMemory memory;
   const BindReport report = bind().report();
-  const std::int64_t peak = process_bytes("VmHWM:") - before;
+  const std::int64_t peak = memory.added_bytes();
   const Offset allowed = 20 * static_cast<Offset>(report.num_points) +
                          200 * static_cast<Offset>(report.num_active_cells) + 24 * report.num_stencil_entries;
   fmt::print(
@@ -79,19 +70,30 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
       report.num_points, report.num_active_cells, report.num_active_vertices, report.num_stencil_entries, report.bytes,
       allowed, peak);
 
+  const Values<float> values = workload.deformed.cast<float>();
+  Values<float> out;
+  Workspace<float> workspace;
+  const auto frames = std::max<Offset>(3, 1'000'000 / std::max<Offset>(report.num_points, 1));
   for (int round = 0; round < rounds; ++round) {
     Stopwatch watch;
     locate(mesh, workload.points, nearest.tolerance);
     const double located = watch.lap();
-    bind();
+    const Interpolant<float> interpolant = bind();
     const double bound = watch.lap();
+    interpolant.evaluate_sorted(values, out, workspace);
+    double frame = watch.lap();
+    for (Offset repetition = 0; repetition < frames; ++repetition) {
+      interpolant.evaluate_sorted(values, out, workspace);
+      frame = std::min(frame, watch.lap());
+    }
     const std::pair<const char*, double> operations[] = {{"locate", located},
                                                          {"bind", bound},
                                                          {"bind.embed", parts.embed},
                                                          {"bind.active_vertices", parts.active},
                                                          {"bind.incidence", parts.incidence},
                                                          {"bind.reconstruct", parts.reconstruct},
-                                                         {"bind.pack", parts.pack}};
+                                                         {"bind.pack", parts.pack},
+                                                         {"frame", frame}};
     for (const auto& [operation, time] : operations)
       fmt::print("{{\"impl\":\"halfgrad\",\"op\":\"{}\",\"seconds\":{:.9g},\"n\":{},\"round\":{}}}\n", operation, time,
                  report.num_points, round);

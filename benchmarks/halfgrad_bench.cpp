@@ -11,11 +11,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <functional>
 #include <optional>
 
 #include "benchmarks/baselines.hpp"
+#include "benchmarks/peak_memory.hpp"
 #include "benchmarks/workload.hpp"
 #include "framework/cell_locator.hpp"
 #include "framework/error.hpp"
@@ -68,14 +68,6 @@ class MovingTenth {
   int frame_ = 0;
 };
 
-// Greatest size of the process in bytes; 0 where the system does not tell.
-std::int64_t peak_bytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with("VmHWM:")) return 1024 * std::atoll(line.c_str() + 6);
-  return 0;
-}
-
 // `only` names operations between commas; all where it is empty.
 void run(const std::string& name, int rounds, std::int64_t max_points, int threads, const std::string& only) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
@@ -91,9 +83,9 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
         ChandrashekarGarg().reconstruct(CellGradients(mesh), active_vertices(mesh, located));
     return Interpolant<float>(mesh, located, named_rule("phong"), &stencils);
   };
-  const std::int64_t peak_before = peak_bytes();
+  const PeakMemory memory;
   const BindReport report = bind().report();
-  const std::int64_t peak_of_bind = peak_bytes() - peak_before;
+  const std::int64_t peak_of_bind = memory.added_bytes();
 
   const Embedding embedding = embed(mesh, workload.points, nearest);
   const Reconstruction reconstruction =

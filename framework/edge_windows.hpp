@@ -37,8 +37,9 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Edge& edge) {
   std::vector<Slot> slots(std::size_t{1} << bits);
   const auto num_runs = static_cast<Index>(nodes.size());
   EdgeWindows<Scalar> result;
-  result.of_run.reserve(nodes.size() * num_edges);
-  result.reversed.reserve(nodes.size());
+  reserve_large(result.of_run, nodes.size() * num_edges);
+  result.of_run.resize(nodes.size() * num_edges);
+  result.reversed.resize(nodes.size());
   // Room for edges that no two runs share; what is not used is never touched.
   reserve_large(result.ends, nodes.size() * num_edges);
   reserve_large(result.vectors, nodes.size() * num_edges * dim + kernels::vector_padding);
@@ -46,7 +47,8 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Edge& edge) {
     const auto num_before = static_cast<Index>(result.ends.size());
     if (run % kernels::window_size == 0) result.first.push_back(num_before);
     const Index window_begin = result.first.back();
-    result.reversed.push_back(0);
+    std::uint8_t reversed = 0;
+    std::uint16_t* of_run = &result.of_run[static_cast<std::size_t>(run) * num_edges];
     for (int i = 0; i < dim; ++i)
       for (int j = i + 1; j <= dim; ++j) {
         const auto [low, high] = std::minmax(nodes[run][i], nodes[run][j]);
@@ -58,18 +60,19 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Edge& edge) {
         if (slots[at].edge < window_begin) {
           slots[at] = {low, high, static_cast<Index>(result.ends.size())};
           result.ends.push_back({nodes[run][i], nodes[run][j]});
-          const Vector vector = edge(run, i, j);
+          const Eigen::Matrix<double, dim, 1> vector = edge(run, i, j);
           for (int k = 0; k < dim; ++k) result.vectors.push_back(static_cast<Scalar>(vector[k]));
         }
-        result.of_run.push_back(static_cast<std::uint16_t>(slots[at].edge - window_begin));
+        *of_run++ = static_cast<std::uint16_t>(slots[at].edge - window_begin);
         if (result.ends[slots[at].edge][0] != nodes[run][i])
-          result.reversed.back() |= static_cast<std::uint8_t>(1 << kernels::edge_number(dim, i, j));
+          reversed |= static_cast<std::uint8_t>(1 << kernels::edge_number(dim, i, j));
       }
+    result.reversed[run] = reversed;
   }
   result.first.push_back(static_cast<Index>(result.ends.size()));
-  result.ends.shrink_to_fit();
+  shrink_large(result.ends);
   result.vectors.resize(result.vectors.size() + kernels::vector_padding);
-  result.vectors.shrink_to_fit();
+  shrink_large(result.vectors);
   return result;
 }
 

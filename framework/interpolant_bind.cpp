@@ -3,6 +3,7 @@
 
 #include "framework/grid.hpp"
 #include "framework/interpolant_binding.hpp"
+#include "framework/large_array.hpp"
 
 namespace halfgrad {
 
@@ -46,7 +47,9 @@ struct CodedCell {
 // Sorts by code; cells of one code keep their order.
 void sort_by_code(std::vector<CodedCell>& cells) {
   constexpr int bits = 11, mask = (1 << bits) - 1;
-  std::vector<CodedCell> sorted(cells.size());
+  std::vector<CodedCell> sorted;
+  reserve_large(sorted, cells.size());
+  sorted.resize(cells.size());
   for (int shift = 0; shift < 32; shift += bits) {
     std::array<Index, mask + 2> next{};
     for (const CodedCell& cell : cells) ++next[(cell.code >> shift & mask) + 1];
@@ -65,9 +68,11 @@ struct CellOrder {
 
 CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
   std::vector<Index> count(static_cast<std::size_t>(mesh.num_cells()), 0);
+  Index num_active = 0;
   for (Index cell : embedding.cells)
-    if (cell >= 0) ++count[cell];
+    if (cell >= 0) num_active += count[cell]++ == 0;
   std::vector<CodedCell> coded;
+  reserve_large(coded, static_cast<std::size_t>(num_active));
   if (mesh.num_cells() > 0) {
     const MortonCode code(mesh.vertices());
     for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
@@ -88,7 +93,6 @@ CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
     order.first_point.push_back(begin + count[each.cell]);
     count[each.cell] = begin;  // now where the cell's next point goes
   }
-  reserve_large(order.points, static_cast<std::size_t>(order.first_point.back()));
   order.points.resize(static_cast<std::size_t>(order.first_point.back()));
   for (Index p = 0; p < embedding.num_points(); ++p)
     if (embedding.cells[p] >= 0) order.points[count[embedding.cells[p]]++] = p;
@@ -126,7 +130,6 @@ namespace {
 std::vector<Index> inverse_unless_identity(const std::vector<Index>& permutation) {
   std::vector<Index> inverse;
   if (std::is_sorted(permutation.begin(), permutation.end())) return inverse;
-  reserve_large(inverse, permutation.size());
   inverse.resize(permutation.size());
   for (std::size_t s = 0; s < permutation.size(); ++s) inverse[permutation[s]] = static_cast<Index>(s);
   return inverse;
@@ -187,7 +190,6 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
   for (std::size_t r = 0; r < num_runs; ++r)
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
   const auto num_points = static_cast<std::size_t>(runs.first.back());
-  reserve_large(runs.local, num_points * d + kernels::vector_padding);
   runs.local.assign(num_points * d + kernels::vector_padding, Scalar(0));
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
@@ -380,7 +382,6 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
   }
 
   const std::vector<Index> outside_row = outside_rows(embedding);
-  reserve_large(binding->permutation, embedding.cells.size());
   binding->permutation.resize(embedding.cells.size());
   Index base = 0;
   Elements::for_each([&]<class E>() {
@@ -399,9 +400,10 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
                             binding->permutation.data() + base);
     if constexpr (E::affine)
       if (rule.needs_gradients() && !rule.needs_hessians())
-        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run, int i, int j) -> Vector {
+        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run, int i, int j) -> ReferencePoint<E> {
           const std::span<const Index> vertices = mesh.cell_vertices(order.cells[members[run]]);
-          return (mesh.vertices().row(vertices[j]) - mesh.vertices().row(vertices[i])).transpose();
+          const auto position = [&](int node) { return mesh.vertices().row(vertices[node]).template head<E::dim>(); };
+          return (position(j) - position(i)).transpose();
         });
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));

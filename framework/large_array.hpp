@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstddef>
+#include <iterator>
 #include <memory>
 #include <type_traits>
+#include <vector>
 
 namespace halfgrad {
 
@@ -32,12 +34,24 @@ LargeArray<T> large_array(std::size_t size) {
 /// Asks for such pages under memory that is about to be written for the first time.
 void use_large_pages(void* memory, std::size_t bytes);
 
-/// std::vector::reserve in such pages.
-template <class Vector>
-void reserve_large(Vector& vector, std::size_t size) {
+/// std::vector::reserve in such pages. Room that is never used costs no memory.
+template <class T>
+void reserve_large(std::vector<T>& vector, std::size_t size) {
   if (size <= vector.capacity()) return;
-  vector.reserve(size);
-  use_large_pages(vector.data() + vector.size(), (size - vector.size()) * sizeof(vector[0]));
+  std::vector<T> larger;
+  larger.reserve(size);
+  use_large_pages(larger.data(), size * sizeof(T));
+  larger.insert(larger.end(), std::make_move_iterator(vector.begin()), std::make_move_iterator(vector.end()));
+  vector.swap(larger);
+}
+
+/// std::vector::shrink_to_fit in such pages.
+template <class T>
+void shrink_large(std::vector<T>& vector) {
+  std::vector<T> exact;
+  reserve_large(exact, vector.size());
+  exact.assign(vector.begin(), vector.end());
+  vector.swap(exact);
 }
 
 }  // namespace halfgrad

@@ -31,7 +31,7 @@ class CellStar {
   std::span<const double* const> gradients();
 
  private:
-  static constexpr std::size_t max_known = 160'000;  // 1.3 MB, 10,000 tetrahedra
+  static constexpr std::size_t max_known = 80'000;  // 1.3 MB, 10,000 tetrahedra
 
   const CellGradients* geometry_;
   std::vector<double> known_;   // volume, centroid, gradient stencil of one cell after the other

@@ -138,7 +138,7 @@ void compose(const CellGradients& cells, Index vertex, std::span<const Index> ce
         if (place < 0) {
           place = static_cast<Index>(row.keys.size());
           row.keys.push_back(static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(place));
-          row.sums.resize(row.sums.size() + D, 0.0);
+          for (int a = 0; a < D; ++a) row.sums.push_back(0);
         }
         double* sum = row.sums.data() + static_cast<std::size_t>(place) * D;
         for (int a = 0; a < D; ++a) sum[a] += cell_weights[k] * weight[a];
@@ -159,8 +159,7 @@ void compose(const CellGradients& cells, Index vertex, std::span<const Index> ce
 }  // namespace
 
 void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
-                 std::span<const double* const> gradients, std::span<const double> cell_weights,
-                 StencilRow& row) {
+                 std::span<const double* const> gradients, std::span<const double> cell_weights, StencilRow& row) {
   static_assert(max_gdim == 4);
   if (cells.gdim() == 1) return compose<1>(cells, vertex, cell_numbers, gradients, cell_weights, row);
   if (cells.gdim() == 2) return compose<2>(cells, vertex, cell_numbers, gradients, cell_weights, row);
