@@ -4,7 +4,6 @@
 #include <cstring>
 
 #include "framework/interpolant_binding.hpp"
-#include "framework/kernels/blend_stage.hpp"
 #include "framework/kernels/formulas.hpp"
 
 namespace halfgrad {
@@ -42,30 +41,6 @@ std::array<Scalar, 9> line_scale(const FastRule& rule, int gdim) {
   return scale;
 }
 
-// Room for `count` numbers; its content is not kept.
-template <class Scalar>
-Scalar* reserve(std::vector<kernels::CacheLine>& memory, Offset count) {
-  const auto bytes = static_cast<std::size_t>(count) * sizeof(Scalar);
-  const std::size_t num_lines = (bytes + sizeof(kernels::CacheLine) - 1) / sizeof(kernels::CacheLine);
-  if (memory.size() < num_lines) memory.resize(num_lines);
-  return reinterpret_cast<Scalar*>(memory.data());
-}
-
-// Vertices a task where a loop over vertices is worth a second thread.
-Offset vertex_grain(Offset num_vertices) { return num_vertices < 20'000 ? num_vertices : 2048; }
-
-// Rows of `values` in the binding's numbering, padded to four.
-template <int columns, class Scalar>
-void pack_positions(const Values<Scalar>& values, std::span<const Index> vertices, Scalar* positions) {
-  const auto count = static_cast<Offset>(vertices.size());
-  parallel_for(count, vertex_grain(count), [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t v = begin; v < end; ++v) {
-      const Scalar* from = values.data() + static_cast<Offset>(vertices[v]) * columns;
-      for (int c = 0; c < 4; ++c) positions[4 * v + c] = c < columns ? from[c] : Scalar(0);
-    }
-  });
-}
-
 // Lines of the active vertices from gradients that were computed elsewhere.
 template <class Scalar>
 void pack_lines(const Scalar* positions, const Values<Scalar>& gradients, const Values<Scalar>* hessians, int columns,
@@ -85,14 +60,6 @@ void pack_lines(const Scalar* positions, const Values<Scalar>& gradients, const 
   });
 }
 
-template <class Stencils, class Scalar>
-kernels::VertexStage<Scalar> vertex_stage(const Stencils& stencils, int num_weights, const std::array<Scalar, 9>& scale,
-                                          const Scalar* positions, Scalar* lines) {
-  return {
-      num_weights, stencils.first_group.data(), stencils.neighbors.data(), stencils.weights.data(), scale, positions,
-      lines};
-}
-
 // `out` is that of the first point of all blocks.
 template <class Runs, class Scalar>
 kernels::PointStage<Scalar> point_stage(const Runs& runs, Eigen::Index columns, kernels::Recipe recipe,
@@ -110,48 +77,6 @@ kernels::PointStage<Scalar> point_stage(const Runs& runs, Eigen::Index columns, 
           .tolerance = static_cast<Scalar>(tolerance),
           .out = out + static_cast<Offset>(runs.base) * columns};
 }
-
-// Calls f with a std::integral_constant of the number of columns where it is 1, 2 or 3, else of −1.
-template <class Function>
-void with_columns(Eigen::Index columns, Function&& f) {
-  switch (columns) {
-    case 1:
-      return f(std::integral_constant<int, 1>());
-    case 2:
-      return f(std::integral_constant<int, 2>());
-    case 3:
-      return f(std::integral_constant<int, 3>());
-    default:
-      return f(std::integral_constant<int, -1>());
-  }
-}
-
-// Gradients under a blend, #active × (#columns · gdim), from lines where kernels serve the width.
-template <class Binding, class Scalar>
-void blend_gradients(const Binding& binding, const Values<Scalar>& values, Workspace<Scalar>& workspace,
-                     Values<Scalar>& gradients) {
-  const Eigen::Index columns = values.cols();
-  const int gdim = binding.gdim;
-  if (columns > kernels::max_fast_columns || gdim > kernels::max_simplex_dim) {
-    gradients = blended_gradients(*binding.blended, values);
-    return;
-  }
-  Scalar* positions = reserve<Scalar>(workspace.positions, 4 * static_cast<Offset>(binding.vertices.size()));
-  with_columns(columns, [&](auto fixed) {
-    if constexpr (fixed() > 0) pack_positions<fixed()>(values, binding.vertices, positions);
-  });
-  const Offset length = 4 * (1 + gdim);
-  Scalar* lines = reserve<Scalar>(workspace.lines, binding.num_active * length);
-  std::array<Scalar, 9> one;
-  one.fill(1);
-  binding.blend_lines(positions, one, workspace, lines);
-  gradients.resize(binding.num_active, columns * gdim);
-  for (Offset v = 0; v < binding.num_active; ++v)
-    for (Eigen::Index c = 0; c < columns; ++c)
-      for (int k = 0; k < gdim; ++k) gradients(v, c * gdim + k) = lines[v * length + 4 * (1 + k) + c];
-}
-
-bool is_fast_width(Eigen::Index columns) { return columns >= 1 && columns <= kernels::max_fast_columns; }
 
 // Calls f(begin, end) for each range of consecutive items in [begin, end) that are chosen.
 template <class Chosen, class Function>
@@ -200,34 +125,6 @@ std::span<const Index> Interpolant<Scalar>::active() const {
 template <class Scalar>
 std::span<const Index> Interpolant<Scalar>::permutation() const {
   return binding_->permutation;
-}
-
-template <class Scalar>
-void Interpolant<Scalar>::Binding::plain_vertex_stage(const Values<Scalar>& values, int first_weight, int width,
-                                                      Values<Scalar>& out) const {
-  const Eigen::Index columns = values.cols();
-  out.resize(num_active, columns * width);
-  parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t r = begin; r < end; ++r) {
-      Scalar* row = out.data() + r * columns * width;
-      std::fill(row, row + columns * width, Scalar(0));
-      const Scalar* own = values.data() + static_cast<Offset>(vertices[r]) * columns;
-      for (Offset e = stencils.begin(r); e < stencils.end(r); ++e) {
-        const Scalar* other = values.data() + static_cast<Offset>(vertices[stencils.neighbors[e]]) * columns;
-        for (Eigen::Index c = 0; c < columns; ++c) {
-          const Scalar difference = other[c] - own[c];
-          for (int k = 0; k < width; ++k) row[c * width + k] += difference * stencils.weight(e, first_weight + k);
-        }
-      }
-    }
-  });
-}
-
-template <class Scalar>
-Values<Scalar> Interpolant<Scalar>::Binding::vertex_hessians(const Values<Scalar>& values) const {
-  Values<Scalar> result;
-  plain_vertex_stage(values, gdim, num_symmetric(gdim), result);
-  return result;
 }
 
 template <class Scalar>
@@ -298,13 +195,7 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
 
   // Gradients for the plain path.
   if (rule.needs_gradients() && gradients == nullptr && any_plain) {
-    if (blended && options.kernel == Kernel::plain)
-      workspace.gradients = blended_gradients(*blended, values);
-    else if (blended)
-      blend_gradients(*this, values, workspace, workspace.gradients);
-    else
-      plain_vertex_stage(values, 0, gdim, workspace.gradients);
-    if (rule.needs_hessians()) workspace.hessians = vertex_hessians(values);
+    vertex_derivatives(values, options.kernel, workspace, workspace.gradients, workspace.hessians);
     gradients = &workspace.gradients;
     hessians = rule.needs_hessians() ? &workspace.hessians : nullptr;
   }
@@ -313,24 +204,15 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
   const int num_weights = kernels::num_weights(fast.recipe, gdim);
   if (any_fast) {
     const bool from_stencils = num_weights > 0 && gradients == nullptr;
-    const std::span<const Index> needed =
-        std::span(vertices).first(from_stencils ? vertices.size() : static_cast<std::size_t>(num_active));
-    Scalar* positions = reserve<Scalar>(workspace.positions, 4 * static_cast<Offset>(needed.size()));
-    with_columns(values.cols(), [&](auto columns) {
-      if constexpr (columns() > 0) pack_positions<columns()>(values, needed, positions);
-    });
+    const Scalar* const positions =
+        pack_positions(values, from_stencils ? static_cast<Offset>(vertices.size()) : num_active, workspace);
     lines = positions;
     if (num_weights > 0) {
       Scalar* target = reserve<Scalar>(workspace.lines, static_cast<Offset>(num_active) * 4 * (1 + num_weights));
       lines = target;
       const auto scale = line_scale<Scalar>(fast, gdim);
-      if (from_stencils && blended) {
-        blend_lines(positions, scale, workspace, target);
-      } else if (from_stencils) {
-        const auto stage = vertex_stage(stencils, num_weights, scale, static_cast<const Scalar*>(positions), target);
-        parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
-          stage.run(static_cast<Index>(begin), static_cast<Index>(end));
-        });
+      if (from_stencils) {
+        vertex_lines(positions, scale, workspace, target);
       } else {
         pack_lines(positions, *gradients, hessians, static_cast<int>(values.cols()), gdim, scale, target);
       }
@@ -357,32 +239,6 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
     weighted_point_stage(values, gradients != nullptr ? *gradients : none, hessians != nullptr ? *hessians : none, out);
   std::fill(out + static_cast<Offset>(num_served) * values.cols(),
             out + static_cast<Offset>(report.num_points) * values.cols(), std::numeric_limits<Scalar>::quiet_NaN());
-}
-
-template <class Scalar>
-void Interpolant<Scalar>::Binding::blend_lines(const Scalar* positions, const std::array<Scalar, 9>& scale,
-                                               Workspace<Scalar>& workspace, Scalar* lines) const {
-  std::array<Scalar, 9> one;
-  one.fill(1);
-  Scalar* const fitted = reserve<Scalar>(workspace.fitted, stencils.num_rows() * 4 * (1 + Offset{gdim}));
-  const auto run = [](Index num_rows, const auto& stage) {
-    parallel_for(num_rows, vertex_grain(num_rows), [&](std::int64_t begin, std::int64_t end) {
-      stage.run(static_cast<Index>(begin), static_cast<Index>(end));
-    });
-  };
-  run(num_active, vertex_stage(blend.averaging, gdim, one, positions, lines));
-  run(stencils.num_rows(), vertex_stage(stencils, gdim, one, positions, fitted));
-  const AdaptiveBlend& given = *blended->blend;
-  run(num_active, kernels::BlendStage<Scalar>{.dim = gdim,
-                                              .edge_offsets = given.edge_offsets.data(),
-                                              .edge_rows = given.edge_rows.data(),
-                                              .edges = blend.edges.data(),
-                                              .metrics = blend.metrics.data(),
-                                              .caution = blend.caution.data(),
-                                              .fitted = fitted,
-                                              .prediction_share = static_cast<Scalar>(given.prediction_share),
-                                              .scale = scale,
-                                              .lines = lines});
 }
 
 template <class Scalar>
@@ -429,8 +285,7 @@ Index Interpolant<Scalar>::Binding::update(const Values<Scalar>& values, const E
     lines = target;
     std::uint8_t* const stale = moved.data() + count;
     changed = stale;
-    const auto stage = vertex_stage(stencils, num_weights, line_scale<Scalar>(fast, gdim),
-                                    static_cast<const Scalar*>(positions), target);
+    const auto stage = vertex_stage(stencils, line_scale<Scalar>(fast, gdim), positions, target);
     parallel_for(num_active, vertex_grain(num_active), [&](std::int64_t begin, std::int64_t end) {
       for (std::int64_t r = begin; r < end; ++r) {
         std::uint8_t any = moved[r];
@@ -516,7 +371,10 @@ void Interpolant<Scalar>::evaluate_sorted(const Values<Scalar>& values, Values<S
   const Binding& binding = *binding_;
   binding.require_values(values);
   if (binding.rule.needs_gradients()) binding.require_gradients();
-  out.resize(num_points(), values.cols());
+  if (out.rows() != num_points() || out.cols() != values.cols()) {
+    out.resize(num_points(), values.cols());
+    use_large_pages(out.data(), static_cast<std::size_t>(out.size()) * sizeof(Scalar));
+  }
   binding.frame(values, nullptr, nullptr, options, workspace, out.data());
 }
 
@@ -556,28 +414,6 @@ Values<Scalar> Interpolant<Scalar>::evaluate(const Values<Scalar>& values, const
   Workspace<Scalar> workspace;
   evaluate(values, out, workspace, options);
   return out;
-}
-
-template <class Scalar>
-Values<Scalar> Interpolant<Scalar>::vertex_gradients(const Values<Scalar>& values) const {
-  binding_->require_values(values);
-  binding_->require_gradients();
-  Values<Scalar> gradients;
-  if (binding_->blended) {
-    Workspace<Scalar> workspace;
-    blend_gradients(*binding_, values, workspace, gradients);
-    return gradients;
-  }
-  binding_->plain_vertex_stage(values, 0, binding_->gdim, gradients);
-  return gradients;
-}
-
-template <class Scalar>
-Values<Scalar> Interpolant<Scalar>::vertex_hessians(const Values<Scalar>& values) const {
-  binding_->require_values(values);
-  binding_->require_gradients();
-  if (!binding_->rule.needs_hessians()) raise("this interpolant keeps no vertex Hessians: only dual_taylor does");
-  return binding_->vertex_hessians(values);
 }
 
 template <class Scalar>

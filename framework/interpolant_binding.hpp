@@ -8,9 +8,43 @@
 #include "framework/edge_windows.hpp"
 #include "framework/error.hpp"
 #include "framework/interpolant.hpp"
+#include "framework/large_array.hpp"
 #include "framework/parallel.hpp"
 
 namespace halfgrad {
+
+// Room for `count` numbers; its content is not kept.
+template <class Scalar>
+Scalar* reserve(std::vector<kernels::CacheLine>& memory, Offset count) {
+  const auto bytes = static_cast<std::size_t>(count) * sizeof(Scalar);
+  const std::size_t num_lines = (bytes + sizeof(kernels::CacheLine) - 1) / sizeof(kernels::CacheLine);
+  if (memory.size() < num_lines) {
+    memory.clear();
+    reserve_large(memory, num_lines);
+    memory.resize(num_lines);
+  }
+  return reinterpret_cast<Scalar*>(memory.data());
+}
+
+// Vertices a task where a loop over vertices is worth a second thread.
+inline Offset vertex_grain(Offset num_vertices) { return num_vertices < 20'000 ? num_vertices : 2048; }
+
+// Calls f with a std::integral_constant of the number of columns where it is 1, 2 or 3, else of −1.
+template <class Function>
+void with_columns(Eigen::Index columns, Function&& f) {
+  switch (columns) {
+    case 1:
+      return f(std::integral_constant<int, 1>());
+    case 2:
+      return f(std::integral_constant<int, 2>());
+    case 3:
+      return f(std::integral_constant<int, 3>());
+    default:
+      return f(std::integral_constant<int, -1>());
+  }
+}
+
+inline bool is_fast_width(Eigen::Index columns) { return columns >= 1 && columns <= kernels::max_fast_columns; }
 
 template <class Scalar>
 struct Interpolant<Scalar>::Binding {
@@ -165,9 +199,22 @@ struct Interpolant<Scalar>::Binding {
     return correction_bound(runs, run, gradients, columns) <= tolerance;
   }
 
-  // The plain path.
+  // The vertex stage.
+  // The first `count` rows of values in the binding's numbering, padded to four columns with zeros.
+  Scalar* pack_positions(const Values<Scalar>& values, Offset count, Workspace<Scalar>& workspace) const;
+  static kernels::VertexStage<Scalar> vertex_stage(const Stencils& rows, const std::array<Scalar, 9>& scale,
+                                                   const Scalar* positions, Scalar* lines) {
+    return {rows.width, rows.first_group.data(), rows.neighbors.data(), rows.weights.data(), scale, positions, lines};
+  }
+  // Lines of the active vertices, of the blend where there is one; scale as in kernels::VertexStage.
+  void vertex_lines(const Scalar* positions, const std::array<Scalar, 9>& scale, Workspace<Scalar>& workspace,
+                    Scalar* lines) const;
+  // F, and Q where the rule needs Hessians, of the active vertices.
+  void vertex_derivatives(const Values<Scalar>& values, Kernel kernel, Workspace<Scalar>& workspace,
+                          Values<Scalar>& gradients, Values<Scalar>& hessians) const;
   void plain_vertex_stage(const Values<Scalar>& values, int first_weight, int width, Values<Scalar>& out) const;
-  Values<Scalar> vertex_hessians(const Values<Scalar>& values) const;
+
+  // The plain path.
   template <int fixed_columns, class E>
   void plain_point_stage(const Runs<E>& runs, Index begin, Index end, const Values<Scalar>& values,
                          const Values<Scalar>& gradients, const Values<Scalar>& hessians, double tolerance,
@@ -193,9 +240,6 @@ struct Interpolant<Scalar>::Binding {
   void frame(const Values<Scalar>& values, const Values<Scalar>* gradients, const Values<Scalar>* hessians,
              const EvaluateOptions& options, Workspace<Scalar>& workspace, Scalar* out) const;
   void to_caller_order(const Values<Scalar>& sorted, Values<Scalar>& out) const;
-  // Lines of the active vertices under the blend; scale as in kernels::VertexStage.
-  void blend_lines(const Scalar* positions, const std::array<Scalar, 9>& scale, Workspace<Scalar>& workspace,
-                   Scalar* lines) const;
   // Whether every cell goes the fast path alone.
   bool all_fast(Eigen::Index columns, Kernel kernel) const;
   // The cells that changed since the workspace's last frame; their number.
