@@ -41,10 +41,10 @@ struct EvaluateOptions {
 /// Memory of a frame, kept between frames. One a thread that evaluates.
 template <class Scalar>
 struct Workspace {
-  Values<Scalar> gradients, hessians;                  ///< of the plain path
+  Values<Scalar> gradients, hessians;                ///< of the plain path
   std::vector<kernels::CacheLine> positions, lines;  ///< of the fast path
   std::vector<kernels::CacheLine> fitted;            ///< lines that a blend reads
-  Values<Scalar> sorted;                               ///< results before they go to the caller's order
+  Values<Scalar> sorted;                             ///< results before they go to the caller's order
 
   std::vector<std::uint8_t> moved;  ///< of update_sorted: vertices whose values changed, then those whose lines did
   const void* holds = nullptr;      ///< the binding whose last update_sorted the buffers hold
