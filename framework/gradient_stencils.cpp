@@ -47,7 +47,8 @@ std::vector<WeightedEdge> weighted_edges(const AdaptiveBlend& blend, Index row, 
   std::vector<WeightedEdge> result;
   double mean = 0;
   for (Offset e = blend.edge_offsets[row]; e < blend.edge_offsets[row + 1]; ++e) {
-    const Eigen::Map<const Eigen::VectorXd> edge(blend.edges.data() + e * gdim, gdim);
+    // A copy: how Eigen sums what a Map shows depends on its address.
+    const Vector edge = Eigen::Map<const Eigen::VectorXd>(blend.edges.data() + e * gdim, gdim);
     const double length = edge.stableNorm();
     result.push_back({edge / length, 1 / length});
     mean += length;
