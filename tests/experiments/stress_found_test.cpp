@@ -317,5 +317,21 @@ TEST(StressFound, SliversFarAwayHoldTheirRoundedCentroids) {
   for (Index p = 0; p < points.rows(); ++p) EXPECT_EQ(found.cells[p], 0) << p;
 }
 
+// The centroids of a cell and its doubles differ by rounding, which counted as a direction in which they lie. The row
+// is that of the cell.
+TEST(StressFound, DoubledCellsHaveOneGradient) {
+  for (int k = 0; k < 20; ++k) {
+    const Eigen::Matrix2d turn = Eigen::Rotation2Dd(0.1 * k).toRotationMatrix();
+    const Mesh mesh = triangles(unit_triangle() * turn.transpose(), {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}});
+    const Reconstruction rows =
+        make_reconstructor("spr").reconstructor->reconstruct(CellGradients(mesh), std::array{0, 1});
+    EXPECT_LT(affine_residual(mesh, rows.stencils, 0), 1e-15);
+    double sum = 0;
+    for (Offset e = 0; e < rows.stencils.offsets[1]; ++e)
+      sum += Eigen::Map<const Eigen::Vector2d>(rows.stencils.weights.data() + 2 * e).norm();
+    EXPECT_NEAR(sum, 2, 1e-14) << k;
+  }
+}
+
 }  // namespace
 }  // namespace halfgrad
