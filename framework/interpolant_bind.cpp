@@ -296,8 +296,8 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
 
 template <class Scalar>
 void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
-  // Quotients along edges must be numbers of the type with room for their products.
-  drop_short_edges(*blended->blend, 1000 * static_cast<double>(std::numeric_limits<Scalar>::min()));
+  // Quotients along edges, weighed by up to 1e6 (adaptive.cpp), must be numbers of the type.
+  drop_short_edges(*blended->blend, 1e6 * static_cast<double>(std::numeric_limits<Scalar>::min()));
   const AdaptiveBlend& given = *blended->blend;
   const GradientStencilTable rows = fitted_rows(*blended);
   for (Index r = num_active; r < rows.num_rows(); ++r) {

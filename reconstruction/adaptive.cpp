@@ -55,10 +55,18 @@ Reconstruction Adaptive::reconstruct(const CellGradients& cells, std::span<const
   blend.beyond = split_rows(result.stencils, static_cast<Index>(vertices.size()));
   for (std::size_t r = 0; r < vertices.size(); ++r) {
     blend.caution.push_back(static_cast<double>(diagnostics[r].absolute_sum) / 5.5);
+    const auto edge_to = [&](Index other) {
+      return Vector((cells.vertices().row(rows[other]) - cells.vertices().row(vertices[r])).transpose());
+    };
+    // A vertex in the same place but for rounding has difference quotients that outweigh all others.
+    double longest = 0;
+    for (Offset pair = first_pair[r]; pair < first_pair[r + 1]; ++pair)
+      longest = std::max(longest, edge_to(pairs[pair]).stableNorm());
     for (Offset pair = first_pair[r]; pair < first_pair[r + 1]; ++pair) {
       const Index other = pairs[pair];
-      const Vector edge = (cells.vertices().row(rows[other]) - cells.vertices().row(vertices[r])).transpose();
-      if (!(edge.squaredNorm() > 0) || !is_sound(diagnostics[other]) || !is_sound(diagnostics[r])) continue;
+      const Vector edge = edge_to(other);
+      if (!(edge.stableNorm() > 1e-12 * longest) || !is_sound(diagnostics[other]) || !is_sound(diagnostics[r]))
+        continue;
       blend.edge_rows.push_back(other);
       blend.edges.insert(blend.edges.end(), edge.data(), edge.data() + gdim);
     }

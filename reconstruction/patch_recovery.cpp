@@ -62,8 +62,9 @@ void Spr::weigh(const CellGradients& cells, Index vertex, CellStar& star) const 
   for (Eigen::Index k = 0; k < count; ++k) centroids.row(k) = star.offsets[k].transpose();
   // The mean first and the slope about it: the weights sum to one whatever the rank.
   const Eigen::RowVectorXd mean = centroids.colwise().mean();
+  const double rounding = 1e-12 * centroids.norm();  // of centroids in one place, as of a cell and its double
   centroids.rowwise() -= mean;
-  const PseudoInverse slope = pseudo_inverse(centroids, undetermined * centroids.norm());
+  const PseudoInverse slope = pseudo_inverse(centroids, std::max(rounding, undetermined * centroids.norm()));
   const Eigen::RowVectorXd weights =
       Eigen::RowVectorXd::Constant(count, 1.0 / static_cast<double>(count)) - mean * slope.matrix;
   star.weights.assign(weights.begin(), weights.end());

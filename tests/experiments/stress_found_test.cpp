@@ -277,9 +277,9 @@ TEST(StressFound, WeightsBesideANearlyCollapsedCornerReproducePositions) {
 TEST(StressFound, AdaptiveBlendsFloatsBesideShortEdges) {
   for (const double scale : {1.0, 1e-25}) {
     for (const double length : {1e-14, 1e-25}) {
-      Points vertices(5, 2);
-      vertices << 0, 0, 1, 0, 0, 1, 1, 1, 0, -length;
-      const Mesh mesh = triangles(scale * vertices, {{0, 1, 2}, {1, 3, 2}, {4, 0, 2}});
+      Points vertices(7, 2);
+      vertices << 0, 0, 1, 0, 0, 1, 1, 1, 0, -length, -1, 0, 0, -1;
+      const Mesh mesh = triangles(scale * vertices, {{0, 1, 2}, {1, 3, 2}, {4, 0, 2}, {4, 5, 6}});
       Points points(2, 2);
       points << 0.25, 0.25, 0.75, 0.75;
       const Embedding embedding = embed(mesh, scale * points);
@@ -287,8 +287,8 @@ TEST(StressFound, AdaptiveBlendsFloatsBesideShortEdges) {
           make_reconstructor("adaptive")
               .reconstructor->reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
       const Interpolant<float> phong(mesh, embedding, named_rule("phong"), &rows);
-      Values<float> values(5, 2);
-      values << 0.1f, 0, 1, 0.2f, 0.3f, 1, 1, 2, 0.7f, -0.4f;
+      Values<float> values(7, 2);
+      values << 0.1f, 0, 1, 0.2f, 0.3f, 1, 1, 2, 0.7f, -0.4f, -1, 0, 0.1f, -1;
       values *= static_cast<float>(scale);
       for (const Kernel kernel : {Kernel::fast, Kernel::plain})
         EXPECT_TRUE(phong.evaluate(values, {.kernel = kernel}).allFinite()) << scale << " " << length;
@@ -315,6 +315,26 @@ TEST(StressFound, SliversFarAwayHoldTheirRoundedCentroids) {
   }
   const CellLocations found = locate(mesh, points, 1e-9);
   for (Index p = 0; p < points.rows(); ++p) EXPECT_EQ(found.cells[p], 0) << p;
+}
+
+// The centroids of a cell and its double differ by rounding, which counted as a direction in which they lie. The row is
+// that of the cell.
+TEST(StressFound, DoubledCellsHaveOneGradient) {
+  ElementBlock<Tetrahedron> block;
+  block.cells.resize(2, 4);
+  block.cells << 0, 1, 2, 3, 2, 1, 0, 3;
+  Points corners(4, 3);
+  corners << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1;
+  for (int k = 0; k < 50; ++k) {
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.1 * k, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+    const Mesh mesh(Points(corners * turn.transpose()), {block});
+    const Reconstruction rows =
+        make_reconstructor("spr").reconstructor->reconstruct(CellGradients(mesh), std::array{0});
+    double sum = 0;
+    for (Offset e = 0; e < rows.stencils.num_entries(); ++e)
+      sum += Eigen::Map<const Eigen::Vector3d>(rows.stencils.weights.data() + 3 * e).norm();
+    EXPECT_NEAR(sum, 3, 1e-13) << k;
+  }
 }
 
 }  // namespace
