@@ -7,7 +7,7 @@
 // The boxes that a cell's bounds meet along the last axis are one contiguous range of points: a row. A cell tests rows.
 // ξ waits in this order too: written at the caller's places while cells are tested, it would miss the cache each time.
 //
-// A slab has a range of the boxes along the first axis. One suffices for a million points on one thread; more points
+// A slab has a range of the boxes along the first axis. One suffices for eight points a cell, or a million; more points
 // are cut into more, so that neither the working set nor the memory beside the result grows with their number, and
 // threads take slabs. In R³ a slab takes 64 bytes a point (16 less a dimension less), at most 8 more for the boxes, and
 // where there are several 4 bytes for each of the points and for each cell and slab that it meets.
@@ -397,9 +397,10 @@ void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Ind
 // Cuts the boxes into slabs of about equal numbers of points: several for each thread where there are threads, and none
 // much larger than max_slab_points. `members` takes the points, slab by slab.
 template <int D>
-std::vector<Slab> make_slabs(const Points& points, const Boxes<D>& boxes, Index num_points,
+std::vector<Slab> make_slabs(const Points& points, const Boxes<D>& boxes, Index num_points, Index num_cells,
                              LargeArray<Index>& members) {
-  constexpr Index max_slab_points = 1 << 20;
+  // A slab costs the cells that it shares with its neighbours: cheap where there are many points for a cell.
+  const Index max_slab_points = std::clamp(num_cells, 1 << 11, 1 << 17) << 3;
   const int num_slices = boxes.size(0);
   const Index num_wanted = std::max(num_threads() == 1 ? 1 : 4 * num_threads(), (num_points - 1) / max_slab_points + 1);
   if (num_wanted == 1 || num_slices == 1) return {{0, num_slices - 1, nullptr, num_points, {}}};
@@ -463,7 +464,7 @@ CellLocations locate_in(const Mesh& mesh, const Points& points, double tolerance
   }
   const Boxes<D> boxes(bounds, num_points, cells, mesh.num_cells());
   LargeArray<Index> members;
-  std::vector<Slab> slabs = make_slabs<D>(points, boxes, num_points, members);
+  std::vector<Slab> slabs = make_slabs<D>(points, boxes, num_points, mesh.num_cells(), members);
   const bool whole = slabs[0].is_whole();
   if (!whole) list_cells<D>(mesh, boxes, tolerance, slabs);
 
