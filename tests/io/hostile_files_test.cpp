@@ -127,6 +127,16 @@ TEST_F(HostileFiles, BindingsAreWhatTheWriterWritesAndNothingElse) {
   EXPECT_THAT(message("\xa1\x70halfgrad_binding\x61\xff"), HasSubstr("version"));
 }
 
+// A fuzzer that starts from bindings of an older version gets no farther than the version.
+TEST_F(HostileFiles, BindingsOfTheFuzzersCorpusAreReadWhole) {
+  for (const char* name : {"linear", "plain", "adaptive", "weights", "feet"})
+    EXPECT_EQ(message_of([&] {
+                read_binding(std::string(PROJECT_SOURCE_DIR "/tests/fuzz/corpus/binding/") + name, square, "print");
+              }),
+              "no error")
+        << name;
+}
+
 TEST_F(HostileFiles, ElementsBeforeTheirNodesAreRefused) {
   EXPECT_THAT(
       message_of([&] {
