@@ -107,5 +107,18 @@ TEST(Stress, RefusesOptionsThatMakeNoSense) {
   EXPECT_THAT(message_of([&] { run_stress(options); }), testing::HasSubstr("0 cases"));
 }
 
+// Meshes that broke a promise before what broke it was mended; the plain tests of stress_found_test.cpp say what it
+// was.
+TEST(Stress, MeshesThatFailedOnceHold) {
+  const std::pair<const char*, std::uint64_t> failed[] = {
+      {"segment", 496},      {"segment", 2278},      {"triangle", 944},    {"triangle", 4679},
+      {"triangle", 4858},    {"quadrilateral", 994}, {"tetrahedron", 955}, {"tetrahedron", 9037},
+      {"tetrahedron", 9234}, {"mixed", 225},         {"mixed", 694},       {"mixed", 8181}};
+  for (const auto& [element, seed] : failed)
+    EXPECT_TRUE(
+        run_stress({.seed = seed, .num_cases = 1, .minutes = 0, .elements = {element}, .progress = {}}).passed())
+        << element << " " << seed;
+}
+
 }  // namespace
 }  // namespace halfgrad
