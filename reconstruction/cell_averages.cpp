@@ -136,9 +136,9 @@ CellWeights CellAverage::weights(const CellGradients& cells, Index vertex) const
 Reconstruction CellAverage::reconstruct(const CellGradients& cells, std::span<const Index> vertices) const {
   Reconstruction result;
   result.stencils = assemble_rows_with_workers(cells.gdim(), vertices, [&]() -> RowMaker {
-    return [this, &cells, star = CellStar(cells)](Index vertex, StencilRow& row) mutable {
+    return [this, &cells, star = CellStar(cells), composer = RowComposer()](Index vertex, StencilRow& row) mutable {
       normalised_star(cells, vertex, star);
-      compose_row(cells, vertex, star.cells, star.gradients(), star.weights, row);
+      composer.compose(cells, vertex, star.cells, star.gradients(), star.weights, row);
       row.diagnostics.rule = star.cells.empty() ? StencilRule::none : StencilRule::average;
       row.diagnostics.num_points = static_cast<Index>(star.cells.size());
     };

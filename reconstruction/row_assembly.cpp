@@ -121,50 +121,53 @@ GradientStencilTable assemble_rows_with_workers(int gdim, std::span<const Index>
   return table;
 }
 
-namespace {
-
 template <int D>
-void compose(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
-             std::span<const double* const> gradients, std::span<const double> cell_weights, StencilRow& row) {
-  // Neighbours as they are met, and their sums; sorted at the end. A key is a neighbour's number and its place.
-  row.places.clear();
-  row.keys.clear();
-  row.sums.clear();
+void RowComposer::compose_in(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
+                             std::span<const double* const> gradients, std::span<const double> cell_weights,
+                             StencilRow& row) {
+  places_.clear();
+  keys_.clear();
+  sums_.clear();
   for (std::size_t k = 0; k < cell_numbers.size(); ++k) {
     const double* weight = gradients[k];
     for (const Index v : cells.vertices_of(cell_numbers[k])) {
       if (v != vertex) {
-        Index& place = row.places.of(v);
+        Index& place = places_.of(v);
         if (place < 0) {
-          place = static_cast<Index>(row.keys.size());
-          row.keys.push_back(static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(place));
-          for (int a = 0; a < D; ++a) row.sums.push_back(0);
+          place = static_cast<Index>(keys_.size());
+          keys_.push_back(static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(place));
+          for (int a = 0; a < D; ++a) sums_.push_back(0);
         }
-        double* sum = row.sums.data() + static_cast<std::size_t>(place) * D;
+        double* sum = sums_.data() + static_cast<std::size_t>(place) * D;
         for (int a = 0; a < D; ++a) sum[a] += cell_weights[k] * weight[a];
       }
       weight += D;
     }
   }
-  std::sort(row.keys.begin(), row.keys.end());
-  row.neighbors.resize(row.keys.size());
-  row.weights.resize(row.keys.size() * D);
-  for (std::size_t n = 0; n < row.keys.size(); ++n) {
-    row.neighbors[n] = static_cast<Index>(row.keys[n] >> 32);
-    const double* sum = row.sums.data() + static_cast<std::uint32_t>(row.keys[n]) * D;
+  std::sort(keys_.begin(), keys_.end());
+  row.neighbors.resize(keys_.size());
+  row.weights.resize(keys_.size() * D);
+  for (std::size_t n = 0; n < keys_.size(); ++n) {
+    row.neighbors[n] = static_cast<Index>(keys_[n] >> 32);
+    const double* sum = sums_.data() + static_cast<std::uint32_t>(keys_[n]) * D;
     for (int a = 0; a < D; ++a) row.weights[n * D + static_cast<std::size_t>(a)] = sum[a];
   }
 }
 
-}  // namespace
-
-void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
-                 std::span<const double* const> gradients, std::span<const double> cell_weights, StencilRow& row) {
+void RowComposer::compose(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
+                          std::span<const double* const> gradients, std::span<const double> cell_weights,
+                          StencilRow& row) {
   static_assert(max_gdim == 4);
-  if (cells.gdim() == 1) return compose<1>(cells, vertex, cell_numbers, gradients, cell_weights, row);
-  if (cells.gdim() == 2) return compose<2>(cells, vertex, cell_numbers, gradients, cell_weights, row);
-  if (cells.gdim() == 3) return compose<3>(cells, vertex, cell_numbers, gradients, cell_weights, row);
-  compose<4>(cells, vertex, cell_numbers, gradients, cell_weights, row);
+  switch (cells.gdim()) {
+    case 1:
+      return compose_in<1>(cells, vertex, cell_numbers, gradients, cell_weights, row);
+    case 2:
+      return compose_in<2>(cells, vertex, cell_numbers, gradients, cell_weights, row);
+    case 3:
+      return compose_in<3>(cells, vertex, cell_numbers, gradients, cell_weights, row);
+    default:
+      return compose_in<4>(cells, vertex, cell_numbers, gradients, cell_weights, row);
+  }
 }
 
 void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
@@ -173,7 +176,7 @@ void compose_row(const CellGradients& cells, Index vertex, std::span<const Index
   std::vector<const double*> pointers;
   for (const Index cell : cell_numbers) gradients.push_back(cells.gradient(cell));
   for (const CellGradient& gradient : gradients) pointers.push_back(gradient.weights.data());
-  compose_row(cells, vertex, cell_numbers, pointers, cell_weights, row);
+  RowComposer().compose(cells, vertex, cell_numbers, pointers, cell_weights, row);
 }
 
 }  // namespace halfgrad

@@ -18,10 +18,6 @@ struct StencilRow {
   std::vector<double> hessian_weights;  ///< none, or num_symmetric(gdim) an entry
   StencilDiagnostics diagnostics;
 
-  Places places{32};  ///< of compose_row, kept from row to row
-  std::vector<std::uint64_t> keys;
-  std::vector<double> sums;
-
   void clear();
 };
 
@@ -42,8 +38,22 @@ GradientStencilTable assemble_rows_with_workers(int gdim, std::span<const Index>
 void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
                  std::span<const double> cell_weights, StencilRow& row);
 
-/// The same where the cells' gradient stencils (#nodes × gdim, row-major) are at hand.
-void compose_row(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
-                 std::span<const double* const> gradients, std::span<const double> cell_weights, StencilRow& row);
+/// compose_row for vertex after vertex, where the cells' gradient stencils (#nodes × gdim, row-major) are at hand;
+/// keeps its storage.
+class RowComposer {
+ public:
+  void compose(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
+               std::span<const double* const> gradients, std::span<const double> cell_weights, StencilRow& row);
+
+ private:
+  template <int D>
+  void compose_in(const CellGradients& cells, Index vertex, std::span<const Index> cell_numbers,
+                  std::span<const double* const> gradients, std::span<const double> cell_weights, StencilRow& row);
+
+  // Neighbours as they are met, and their sums; a key is a neighbour's number and its place.
+  Places places_{32};
+  std::vector<std::uint64_t> keys_;
+  std::vector<double> sums_;
+};
 
 }  // namespace halfgrad
