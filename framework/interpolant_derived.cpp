@@ -14,8 +14,12 @@ Values<Scalar> Interpolant<Scalar>::gradient(const Values<Scalar>& values) const
     raise("the gradient of the interpolant at points given by their weights is not known: use smooth_gradient");
   const bool with_gradients = binding.rule.needs_gradients();
   const bool with_hessians = binding.rule.needs_hessians();
-  const Values<Scalar> gradients = with_gradients ? vertex_gradients(values) : Values<Scalar>();
-  const Values<Scalar> hessians = with_hessians ? vertex_hessians(values) : Values<Scalar>();
+  Workspace<Scalar> workspace;
+  const Values<Scalar>&gradients = workspace.gradients, &hessians = workspace.hessians;
+  if (with_gradients) {
+    binding.require_gradients();
+    binding.vertex_derivatives(values, Kernel::fast, workspace, workspace.gradients, workspace.hessians);
+  }
   const Eigen::Index columns = values.cols();
   Values<Scalar> out =
       Values<Scalar>::Constant(num_points(), columns * binding.gdim, std::numeric_limits<Scalar>::quiet_NaN());
