@@ -52,7 +52,6 @@ class Faults : public FileTest {
                                     << arguments << "\n";
     return run_command("sh " + in("limited.sh"));
   }
-  std::string content(const std::string& name) const { return contents_of(file(name)); }
   std::vector<std::string> outputs() const {
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(folder_))

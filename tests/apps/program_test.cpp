@@ -349,10 +349,6 @@ TEST_F(Program, BadInputIsRefusedByNameAndLeavesNothingBehind) {
   const auto overwrite = [&](const std::string& name, const std::string& bytes) {
     std::ofstream(in(name), std::ios::binary) << bytes;
   };
-  const auto content = [&](const std::string& name) {
-    std::ifstream file(in(name), std::ios::binary);
-    return std::string(std::istreambuf_iterator<char>(file), {});
-  };
   const std::string rest = content("rest.vtu");
   overwrite("rest.vtu", rest.substr(0, rest.size() / 2));
   refused(deform(""), "rest.vtu");
@@ -417,10 +413,6 @@ TEST_F(Program, FramesBeforeABadOneAreKeptAndResumed) {
 TEST_F(Program, AKilledRunGoesOnToTheSameBytes) {
   write_frames(std::vector<Points>(3000, bent(mesh.vertices())));
   ASSERT_EQ(deform("", "whole.npy").status, 0);
-  const auto content = [&](const std::string& name) {
-    std::ifstream file(in(name), std::ios::binary);
-    return std::string(std::istreambuf_iterator<char>(file), {});
-  };
   const std::string expected = content("whole.npy");
   const std::string command = " deform --rest " + in("rest.vtu") + " --frames " + in("frames.npy") + " --points " +
                               in("points.vtp") + " --out " + in("out.npy");

@@ -25,7 +25,6 @@ using testing::Not;
 
 class ReportProgram : public FileTest {
  protected:
-  std::string text(const std::string& name) const { return contents_of(file(name)); }
   /// Runs a small configuration under a name.
   void run(const std::string& name) const {
     std::ofstream(in(name + ".json")) << json{{"name", name},
@@ -44,7 +43,7 @@ TEST_F(ReportProgram, MergesRunsIntoOnePageThatNeedsNothingElse) {
   const Outcome outcome = run_program("report " + in("first") + " " + in("second") + " --out " + in("both.html"));
   EXPECT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_THAT(outcome.output, HasSubstr("both.html"));
-  const std::string page = text("both.html");
+  const std::string page = content("both.html");
   EXPECT_THAT(page,
               AllOf(HasSubstr("first"), HasSubstr("second"), Not(HasSubstr("<script src")), Not(HasSubstr("<link"))));
   // What users write stays text, in the page's data too: nothing but the page itself ends a script.
@@ -56,8 +55,8 @@ TEST_F(ReportProgram, MergesRunsIntoOnePageThatNeedsNothingElse) {
     const std::size_t begin = page.find('>', page.find("halfgrad-data")) + 1;
     const json data = json::parse(page.substr(begin, page.find("</script", begin) - begin));
     ASSERT_EQ(data["runs"].size(), 2u);
-    EXPECT_EQ(data["runs"][0]["results"], json::parse(text("first/results.json")));
-    EXPECT_EQ(data["runs"][1]["scene"], json::parse(text("second/scene.json")));
+    EXPECT_EQ(data["runs"][0]["results"], json::parse(content("first/results.json")));
+    EXPECT_EQ(data["runs"][1]["scene"], json::parse(content("second/scene.json")));
     EXPECT_EQ(data["runs"][1]["results"]["config"]["description"], "</script> & <b>");
     // 18 triangles of six points and four faces each; three edges a face, 33 edges of the lattice.
     const json& scene = data["runs"][0]["scene"];
@@ -100,7 +99,7 @@ TEST_F(ReportProgram, SequencesOfEveryRuleAreWritten) {
   truth->read(2, first);
   open_frames(in("out/sequence/truth.npy"))->read(2, second);
   EXPECT_LT((first.leftCols(2) - second).norm(), 1e-12);
-  const json results = json::parse(text("out/results.json"));
+  const json results = json::parse(content("out/results.json"));
   EXPECT_EQ(results["rows"].size(), 6u);
   EXPECT_EQ(results["rows"][1]["options"]["carry"], "displacement");
   // Equal steps of the angle: the error grows with it.
@@ -131,19 +130,19 @@ TEST_F(ReportProgram, DeformCarriesByTheBaselines) {
     points.col(1).array() += 2;
     EXPECT_LT((result - points).norm(), 1e-12) << rule;
     points.col(1).array() -= 2;
-    const json report = json::parse(text("report.json"));
+    const json report = json::parse(content("report.json"));
     EXPECT_EQ(report["counts"]["frames"], 1);
     EXPECT_EQ(report["counts"]["points"], 2);
     EXPECT_GT(report["counts"]["weights"], 2);
 
     // A saved binding gives the same bytes, and refuses another rule.
-    const std::string plain = text("out.npy");
+    const std::string plain = content("out.npy");
     const Outcome bound = run_program("bind --rest " + in("rest.vtu") + " --points " + in("points.vtp") + " --out " +
                                       in("x.hgb") + " --interpolant " + rule);
     ASSERT_EQ(bound.status, 0) << bound.output;
     const std::string again = "deform --binding " + in("x.hgb") + " --frames " + in("frames.npy") + " --out ";
     ASSERT_EQ(run_program(again + in("bound.npy")).status, 0);
-    EXPECT_EQ(text("bound.npy"), plain);
+    EXPECT_EQ(content("bound.npy"), plain);
     EXPECT_EQ(run_program(again + in("bound.npy") + " --interpolant " + rule).status, 0);
     EXPECT_THAT(run_program(again + in("no.npy") + " --interpolant phong").output, HasSubstr("bind again"));
   }

@@ -33,7 +33,6 @@ class RestShapes : public FileTest {
     open_frames(in(name))->read(0, values);
     return values;
   }
-  std::string content(const std::string& name) const { return contents_of(file(name)); }
   /// What deform writes by a saved binding has the same bytes as without; other points are refused.
   void expect_same_bytes_when_bound(const std::string& rest, const std::string& options = "") {
     SCOPED_TRACE(rest + " " + options);

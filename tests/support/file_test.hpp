@@ -17,6 +17,11 @@ namespace halfgrad {
 
 namespace fs = std::filesystem;
 
+inline std::string contents_of(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
 /// An empty folder for each test, removed after it.
 class FileTest : public testing::Test {
  protected:
@@ -36,6 +41,7 @@ class FileTest : public testing::Test {
   }
   /// The path of a file as an argument of the program.
   std::string in(const std::string& name) const { return file(name).string(); }
+  std::string content(const std::string& name) const { return contents_of(file(name)); }
   /// All names in the folder, hidden ones too.
   std::vector<std::string> names() const {
     std::vector<std::string> found;
@@ -46,10 +52,5 @@ class FileTest : public testing::Test {
 
   fs::path folder_;
 };
-
-inline std::string contents_of(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 }  // namespace halfgrad
