@@ -59,20 +59,18 @@ void sort_by_code(std::vector<CodedCell>& cells) {
   }
 }
 
-// The cells that hold points, sorted along a space-filling curve, and the points of each in ascending order.
-struct CellOrder {
-  std::vector<Index> cells;
-  std::vector<Index> first_point;  // #cells + 1, into points
-  std::vector<Index> points;
-};
-
-CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
+// How many points each cell holds.
+std::vector<Index> points_a_cell(const Mesh& mesh, const Embedding& embedding) {
   std::vector<Index> count(static_cast<std::size_t>(mesh.num_cells()), 0);
-  Index num_active = 0;
   for (Index cell : embedding.cells)
-    if (cell >= 0) num_active += count[cell]++ == 0;
+    if (cell >= 0) ++count[cell];
+  return count;
+}
+
+// The cells that hold points, sorted along a space-filling curve.
+std::vector<Index> cells_along_curve(const Mesh& mesh, std::span<const Index> count) {
   std::vector<CodedCell> coded;
-  reserve_large(coded, static_cast<std::size_t>(num_active));
+  reserve_large(coded, count.size() - static_cast<std::size_t>(std::ranges::count(count, 0)));
   if (mesh.num_cells() > 0) {
     const MortonCode code(mesh.vertices());
     for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
@@ -82,16 +80,29 @@ CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
     });
   }
   sort_by_code(coded);
+  std::vector<Index> cells;
+  cells.reserve(coded.size());
+  for (const CodedCell& each : coded) cells.push_back(each.cell);
+  return cells;
+}
 
+// Those cells and the points of each in ascending order.
+struct CellOrder {
+  std::vector<Index> cells;
+  std::vector<Index> first_point;  // #cells + 1, into points
+  std::vector<Index> points;
+};
+
+CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
+  std::vector<Index> count = points_a_cell(mesh, embedding);
   CellOrder order;
-  order.cells.reserve(coded.size());
-  order.first_point.reserve(coded.size() + 1);
+  order.cells = cells_along_curve(mesh, count);
+  order.first_point.reserve(order.cells.size() + 1);
   order.first_point.push_back(0);
-  for (const CodedCell& each : coded) {
+  for (const Index cell : order.cells) {
     const Index begin = order.first_point.back();
-    order.cells.push_back(each.cell);
-    order.first_point.push_back(begin + count[each.cell]);
-    count[each.cell] = begin;  // now where the cell's next point goes
+    order.first_point.push_back(begin + count[cell]);
+    count[cell] = begin;  // now where the cell's next point goes
   }
   order.points.resize(static_cast<std::size_t>(order.first_point.back()));
   for (Index p = 0; p < embedding.num_points(); ++p)
@@ -99,10 +110,10 @@ CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
   return order;
 }
 
-std::vector<Index> vertices_by_first_use(const Mesh& mesh, const CellOrder& order) {
+std::vector<Index> vertices_by_first_use(const Mesh& mesh, std::span<const Index> cells) {
   std::vector<char> seen(static_cast<std::size_t>(mesh.num_vertices()), 0);
   std::vector<Index> active;
-  for (Index cell : order.cells)
+  for (Index cell : cells)
     for (Index v : mesh.cell_vertices(cell))
       if (!seen[v]) {
         seen[v] = 1;
@@ -114,7 +125,7 @@ std::vector<Index> vertices_by_first_use(const Mesh& mesh, const CellOrder& orde
 }  // namespace
 
 std::vector<Index> active_vertices(const Mesh& mesh, const Embedding& embedding) {
-  return vertices_by_first_use(mesh, order_cells(mesh, embedding));
+  return vertices_by_first_use(mesh, cells_along_curve(mesh, points_a_cell(mesh, embedding)));
 }
 
 std::vector<Index> active_vertices(const Grid& grid, const Embedding& embedding) {
@@ -368,7 +379,7 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
   binding->rule = rule;
   binding->gdim = mesh.gdim();
   const CellOrder order = order_cells(mesh, embedding);
-  binding->vertices = vertices_by_first_use(mesh, order);
+  binding->vertices = vertices_by_first_use(mesh, order.cells);
   binding->num_active = static_cast<Index>(binding->vertices.size());
   std::vector<Index> number(static_cast<std::size_t>(num_vertices), -1), part_number;
   if (!numbers.empty()) part_number.assign(numbers.size(), -1);

@@ -129,6 +129,31 @@ TYPED_TEST_P(ElementContract, GradientIsTheDerivativeOfShape) {
   }
 }
 
+TYPED_TEST_P(ElementContract, IsTheUnitSimplexWhereAffine) {
+  using E = TypeParam;
+  if constexpr (E::affine) {
+    NodeMatrix<E> unit = NodeMatrix<E>::Zero();
+    unit.template bottomRows<E::dim>().setIdentity();
+    EXPECT_EQ(E::nodes(), unit);
+    NodeMatrix<E> slope = unit;
+    slope.row(0).setConstant(-1);
+    EXPECT_EQ(E::shape_gradient(E::center()), slope);
+  }
+}
+
+TYPED_TEST_P(ElementContract, CellGradientIsThatOfTheShapeFunctionsAtTheCenter) {
+  using E = TypeParam;
+  std::mt19937 random(5);
+  for (int n = 0; n < 50; ++n) {
+    const NodeMatrix<E> positions = contract_cell<E>(random, 0.15);
+    const CellGradient cell = cell_gradient<E>(positions);
+    const Eigen::Matrix<double, E::dim, E::dim> jacobian = positions.transpose() * E::shape_gradient(E::center());
+    EXPECT_LE((cell.centroid - positions.transpose() * E::shape(E::center())).norm(), 1e-14);
+    EXPECT_NEAR(cell.volume, std::abs(jacobian.determinant()) * E::reference_volume, 1e-14);
+    EXPECT_LE((cell.weights - E::shape_gradient(E::center()) * jacobian.inverse()).norm(), 1e-12);
+  }
+}
+
 TYPED_TEST_P(ElementContract, MarginIsZeroAtNodesAndPositiveAtTheCenter) {
   const auto nodes = TypeParam::nodes();
   EXPECT_GT(TypeParam::margin(TypeParam::center()), 0.1);
@@ -221,9 +246,9 @@ TYPED_TEST_P(ElementContract, PhongReproducesQuadraticsFromExactGradients) {
 
 REGISTER_TYPED_TEST_SUITE_P(ElementContract, SatisfiesTheConcept, ShapeIsOneAtItsNodeAndZeroAtOthers,
                             WeightsSumToOneAndReproducePosition, PolynomialsAreTheShapeFunctions,
-                            CubeCollapsesOntoTheCell, GradientIsTheDerivativeOfShape,
-                            MarginIsZeroAtNodesAndPositiveAtTheCenter, FacetsLieOnTheBoundaryAndCoverEveryNode,
-                            ReferenceVolumeIsTheShareOfTheNodesBox, InverseMapReturnsToThePoint,
-                            PhongReproducesQuadraticsFromExactGradients);
+                            CubeCollapsesOntoTheCell, GradientIsTheDerivativeOfShape, IsTheUnitSimplexWhereAffine,
+                            CellGradientIsThatOfTheShapeFunctionsAtTheCenter, MarginIsZeroAtNodesAndPositiveAtTheCenter,
+                            FacetsLieOnTheBoundaryAndCoverEveryNode, ReferenceVolumeIsTheShareOfTheNodesBox,
+                            InverseMapReturnsToThePoint, PhongReproducesQuadraticsFromExactGradients);
 
 }  // namespace halfgrad
