@@ -72,8 +72,7 @@ class Pc2Sink final : public FrameSink {
     if (!arrays.empty()) raise("{}: PC2 cannot hold the array \"{}\"", name, arrays.front().name);
     if (points.cols() != 2 && points.cols() != 3)
       raise("{}: found {} columns, PC2 holds 2 or 3 coordinates", name, points.cols());
-    if (num_points_ == 0) num_points_ = static_cast<std::int32_t>(points.rows());
-    if (points.rows() != num_points_)
+    if (num_points_ != 0 && points.rows() != num_points_)
       raise("{}: frame {} has {} points, expected {} as the first", name, file_.num_frames(), points.rows(),
             num_points_);
     std::string bytes;
@@ -86,6 +85,8 @@ class Pc2Sink final : public FrameSink {
                 v, value);
         append_value(bytes, static_cast<float>(value));
       }
+    // Only now: a frame that was refused settles nothing.
+    num_points_ = static_cast<std::int32_t>(points.rows());
     file_.append(header(0), bytes);
   }
 

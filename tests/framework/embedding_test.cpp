@@ -241,6 +241,26 @@ TEST(EmbedPolicies, RefusesWhatItCannotEmbed) {
   EXPECT_THAT(message_of([&] { embed(mesh, points); }), HasSubstr("point 2 is (0.5, nan, 0.5)"));
   EXPECT_THAT(message_of([&] { embed(mesh, Points::Zero(2, 2)); }), HasSubstr("2 coordinates in a mesh of R^3"));
   EXPECT_THAT(message_of([&] { embed(Mesh(Points::Zero(1, 3), {}), Points::Zero(1, 3)); }), HasSubstr("no cells"));
+  points(2, 1) = 0.5;
+  for (const double tolerance : {-1e-9, 0.1, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THAT(message_of([&] { embed(mesh, points, {.tolerance = tolerance}); }), HasSubstr("from 0 to 0.1"));
+  Points flat = mesh.vertices();
+  flat.col(2).setZero();
+  EXPECT_THAT(message_of([&] { embed(Mesh(flat, mesh.blocks()), points); }),
+              HasSubstr("cells of the mesh are degenerate"));
+}
+
+TEST(EmbedPolicies, PointsOutsideByARoundingAreOnTheBoundary) {
+  const Mesh mesh = test::lattice<Hexahedron>(2, 0, 1);
+  Points points(2, 3);
+  points << 1 + 1e-8, 0.5, 0.5, 0.25, -1e-8, 1;
+  const Embedding embedding = embed(mesh, points, {.tolerance = 1e-7});
+  for (int p = 0; p < 2; ++p) EXPECT_NE(embedding.status[p], PointStatus::outside);
+  // What locating takes in reference lengths of a cell, the boundary takes in diagonals of the mesh.
+  points(0, 0) = 1 + 1.5e-7;
+  const Embedding farther = embed(mesh, points, {.tolerance = 1e-7});
+  EXPECT_EQ(farther.status[0], PointStatus::boundary);
+  EXPECT_TRUE(farther.outside.empty());
 }
 
 }  // namespace

@@ -419,11 +419,45 @@ TEST(Interpolant, RefusesWhatItCannotDo) {
   const Interpolant<double> unbound(mesh, embedding, named_rule("phong"), nullptr);
   EXPECT_THAT(message([&] { unbound.evaluate(values); }), HasSubstr("without a reconstructor"));
   const Interpolant<double> bound(mesh, embedding, named_rule("phong"), &reconstruction);
+  Values<double> out;
   EXPECT_THAT(message([&] { bound.evaluate(Values<double>(values.topRows(5))); }), HasSubstr("values of 5 vertices"));
   Reconstruction partial = reconstruction;
   partial = ChandrashekarGarg().reconstruct(CellGradients(mesh), std::vector<Index>{0, 1});
   EXPECT_THAT(message([&] { Interpolant<double>(mesh, embedding, named_rule("phong"), &partial); }),
               HasSubstr("no gradient stencil for vertex"));
+  EXPECT_THAT(message([&] { bound.evaluate_given(values, Values<double>::Zero(3, 9), {}, out); }), HasSubstr("3 × 9"));
+  const Embedding flat = embed(test::lattice<Quadrilateral>(2, 0, 1), Points::Constant(1, 2, 0.3));
+  EXPECT_THAT(message([&] { Interpolant<double>(mesh, flat, named_rule("linear"), nullptr); }),
+              HasSubstr("points embedded in 2 dimensions, but the mesh has 3"));
+  const Reconstruction planar =
+      ChandrashekarGarg().reconstruct(CellGradients(test::lattice<Quadrilateral>(2, 0, 1)), std::vector<Index>{0});
+  EXPECT_THAT(message([&] { Interpolant<double>(mesh, embedding, named_rule("phong"), &planar); }),
+              HasSubstr("stencils of dimension 2 for a mesh of 3"));
+}
+
+// A moved interpolant is the one that it was made from.
+TEST(Interpolant, MovesWithItsBinding) {
+  const Mesh mesh = test::lattice<Triangle>(2, 0.1, 1);
+  const auto [points, embedding] = sampled<Triangle>(mesh, 5);
+  Interpolant<double> first(mesh, embedding, named_rule("linear"), nullptr);
+  const Values<double> before = first.evaluate(mesh.vertices());
+  const Interpolant<double> second(std::move(first));
+  EXPECT_EQ(second.gdim(), 2);
+  EXPECT_EQ(second.num_points(), points.rows());
+  EXPECT_EQ(second.evaluate(mesh.vertices()), before);
+}
+
+// At the apex of a pyramid the map of the cell is singular: the gradient there is the continuous one.
+TEST(Interpolant, GradientAtACollapsedCornerIsTheContinuousOne) {
+  const Mesh mesh = test::lattice<Pyramid>(1, 0, 1);
+  const Points apex = Points::Constant(1, 3, 0.5);
+  const Embedding embedding = embed(mesh, apex);
+  const Reconstruction rows = reconstruct(mesh, embedding);
+  const Interpolant<double> interpolant(mesh, embedding, named_rule("phong"), &rows);
+  const Values<double> values = mesh.vertices() * Eigen::Vector3d(1, -2, 3);
+  const Values<double> gradient = interpolant.gradient(values);
+  EXPECT_EQ(gradient, interpolant.smooth_gradient(values));
+  EXPECT_LE((gradient - Eigen::RowVector3d(1, -2, 3)).norm(), 1e-12);
 }
 
 }  // namespace

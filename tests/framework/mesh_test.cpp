@@ -66,6 +66,13 @@ TEST(Mesh, RefusesBadInputByName) {
   EXPECT_THAT(message_of([&] { Mesh(good.vertices(), {block}); }), HasSubstr("names vertex 0 twice"));
   EXPECT_THAT(message_of([&] { Mesh(Points::Zero(5, 1), good.blocks()); }),
               HasSubstr("triangle cells need vertices with 2 coordinates, found 1"));
+  EXPECT_THAT(message_of([&] { Mesh(Points::Zero(5, 5), good.blocks()); }),
+              HasSubstr("5 coordinates: expected 1 to 4"));
+  ElementBlock<Tetrahedron> tetrahedron;
+  tetrahedron.cells.resize(1, 4);
+  tetrahedron.cells << 0, 1, 2, 3;
+  block = std::get<ElementBlock<Triangle>>(good.blocks()[0]);
+  EXPECT_THAT(message_of([&] { Mesh(Points::Zero(5, 3), {block, tetrahedron}); }), HasSubstr("in a mesh of dimension"));
 }
 
 TEST(Mesh, InspectFindsWhatIsWrong) {

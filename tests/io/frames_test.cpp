@@ -252,6 +252,21 @@ TEST_F(Frames, SinksRefuseWhatTheyCannotHold) {
   EXPECT_THAT(message_of([&] { obj->write(frame_values<float>(0)); }), HasSubstr("a.%04d.obj"));
   const auto pc2 = create_frames(file("a.pc2"));
   EXPECT_THAT(message_of([&] { pc2->write(Points(Points::Constant(1, 3, 1e300))); }), HasSubstr("beyond the floats"));
+  EXPECT_THAT(message_of([&] { pc2->write(Points(Points::Zero(2, 4))); }), HasSubstr("found 4 columns"));
+  pc2->write(Points(Points::Zero(2, 3)));
+  EXPECT_THAT(message_of([&] { pc2->write(Points(Points::Zero(3, 3))); }),
+              AllOf(HasSubstr("frame 1 has 3 points"), HasSubstr("expected 2")));
+  PointSet shape;
+  shape.faces.entries = {0, 1, 2};
+  shape.faces.offsets = {0, 3};
+  const auto faces = create_frames(file("faces.obj"), shape);
+  faces->write(Points(Points::Identity(3, 3)));
+  faces->finish();
+  EXPECT_EQ(content("faces.obj"), "v 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
+  EXPECT_THAT(message_of([&] { create_frames(file("b.obj"))->write(Points(Points::Zero(2, 4))); }),
+              HasSubstr("found 4 columns"));
+  EXPECT_THAT(message_of([&] { create_frames(file("b.pvd"))->write(Points(Points::Zero(2, 4))); }),
+              HasSubstr("found 4 columns"));
 }
 
 TEST_F(Frames, PatternsFindFilesInNaturalOrder) {

@@ -1,8 +1,10 @@
 // Files that a fuzzer or an enemy makes: refused in words, in time and memory that the file's size bounds.
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "framework/io/binding_file.hpp"
+#include "framework/io/frame_source.hpp"
 #include "framework/io/mesh_file.hpp"
 #include "framework/io/npy.hpp"
 #include "framework/io/point_set.hpp"
@@ -151,6 +153,133 @@ TEST_F(HostileFiles, ArraysWithoutColumnsHaveNoRows) {
   file("a.npy", std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header);
   EXPECT_THAT(message_of([&] { read_npy(file("a.npy")); }),
               AllOf(HasSubstr("a.npy"), HasSubstr("(1000000000000000000, 0)")));
+}
+
+// NumPy arrays of version 1 and 2 by their header.
+std::string npy(std::string header, int version = 1) {
+  header.resize(118, ' ');
+  const std::string size = version == 1 ? std::string("\x76\x00", 2) : std::string("\x76\x00\x00\x00", 4);
+  return "\x93NUMPY" + std::string(1, static_cast<char>(version)) + '\0' + size + header;
+}
+
+TEST_F(HostileFiles, NumpyHeadersAreCheckedPartByPart) {
+  const auto message = [&](const std::string& header) {
+    return message_of([&] { read_npy(file("a.npy", npy(header))); });
+  };
+  EXPECT_THAT(message("{'descr': '<i4', 'fortran_order': False, 'shape': (1, 2), }"),
+              AllOf(HasSubstr("a.npy"), HasSubstr("'<i4'")));
+  EXPECT_THAT(message("{'descr': '<f8', 'fortran_order': Maybe, 'shape': (1, 2), }"), HasSubstr("Maybe"));
+  EXPECT_THAT(message("{'descr': '<f8', 'fortran_order': False, 'shape': 7, }"), HasSubstr("a tuple"));
+  EXPECT_THAT(message("{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 2), }"), HasSubstr("\"-1\""));
+  EXPECT_THAT(message("{'descr': '<f8', 'fortran_order': False, 'shape': (1, 2), }"), HasSubstr("16 bytes"));
+  const std::string eight(8, '\0');
+  EXPECT_THAT(message_of([&] {
+                read_npy(file("a.npy", npy("{'descr': '<f8', 'fortran_order': False, 'shape': (1, 1, 1), }") + eight));
+              }),
+              HasSubstr("(1, 1, 1)"));
+  const Values<double> read =
+      read_npy(file("a.npy", npy("{'descr': '<f8', 'fortran_order': False, 'shape': (1, 1), }", 2) + eight));
+  EXPECT_EQ(read, Values<double>::Zero(1, 1));
+  EXPECT_THAT(message_of([&] { read_npy(file("a.npy", npy("", 4))); }), HasSubstr("version 4"));
+}
+
+TEST_F(HostileFiles, FilesOfPointsAreRefusedWithTheirLineOrByte) {
+  const std::string ply = "ply\nformat ascii 1.0\n", vertices = "element vertex 1\nproperty float x\n";
+  const std::vector<std::array<std::string, 3>> cases = {
+      {"a.ply", "ply\nformat text 1.0\n", "binary_little_endian"},
+      {"a.ply", ply + "element vertex 1\nproperty complex x\nend_header\n", "\"complex\""},
+      {"a.ply", ply + vertices + "element vertex 1\n", "a second element"},
+      {"a.ply", ply + "elements vertex 1\n", "property or end_header"},
+      {"a.ply",
+       ply + vertices + "property float y\nproperty float z\nelement face 1\nproperty list int int vertex_indices\n" +
+           "end_header\n0 0 0\n-3 0 0 0\n",
+       "found -3"},
+      {"a.obj", "v 0 0 0\nf x/1 1 1\n", "\"x/1\""},
+      {"a.stl", std::string(80, ' ') + std::string("\x02\0\0\0", 4) + std::string(50, '\0'), "found 2 facets"},
+      {"a.vtp", "<VTKFile type=\"PolyData\" header_type=\"UInt8\"><PolyData/></VTKFile>", "header_type \"UInt8\""},
+      {"a.vtp",
+       "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"1\"><Points><DataArray type=\"Float32\" "
+       "NumberOfComponents=\"2\"> 0 0 </DataArray></Points></Piece></PolyData></VTKFile>",
+       "found 2 components, expected 3"},
+      {"a.vtp",
+       "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"9\"><Points><DataArray type=\"Float32\" "
+       "NumberOfComponents=\"3\"> 0 0 </DataArray></Points></Piece></PolyData></VTKFile>",
+       "expected 27 values"},
+      {"a.vti", "<VTKFile type=\"StructuredGrid\"><StructuredGrid/></VTKFile>", "ImageData or RectilinearGrid"},
+      {"a.vti", "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1\"/></VTKFile>", "found 2 numbers"},
+      {"a.vti", "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0 1 0 0.5\"/></VTKFile>", "whole numbers"},
+      {"a.vti", "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0 1 1 0\"/></VTKFile>", "axis 2"},
+      {"a.vti",
+       "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0 1 0 1\" Direction=\"0 1 0 1 0 0 0 0 1\"><Piece/>"
+       "</ImageData></VTKFile>",
+       "rotated"},
+  };
+  for (const auto& [name, contents, words] : cases)
+    EXPECT_THAT(message_of([&] { read_points(file(name, contents)); }), AllOf(HasSubstr(name), HasSubstr(words)))
+        << contents;
+}
+
+// One block of 8 bytes, compressed; the header's words are set by the caller.
+TEST_F(HostileFiles, CompressedBlocksStayWithinTheArray) {
+  const auto message = [&](std::uint32_t num_blocks, std::uint32_t block_size, std::uint32_t last_size) {
+    const std::string words = bytes<std::uint32_t>({num_blocks, block_size, last_size, 4}) + "abcd";
+    return message_of([&] {
+      read_points(file("a.vtp",
+                       "<VTKFile type=\"PolyData\" compressor=\"vtkZLibDataCompressor\"><PolyData><Piece "
+                       "NumberOfPoints=\"1\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" "
+                       "format=\"appended\" offset=\"0\"/></Points></Piece></PolyData><AppendedData "
+                       "encoding=\"raw\">_" +
+                           words + "</AppendedData></VTKFile>"));
+    });
+  };
+  EXPECT_THAT(message(1, 24, 0), HasSubstr("compressed block 0 is damaged"));
+  EXPECT_THAT(message(1, 25, 0), HasSubstr("block 0 of 25 bytes exceeds the 24 expected"));
+  EXPECT_THAT(message(1, 24, 99), HasSubstr("block 0 of 99 bytes"));
+  EXPECT_THAT(message(1'000'000, 24, 0), HasSubstr("1000000 compressed blocks"));
+}
+
+TEST_F(HostileFiles, SequencesAreRefusedWithWhatIsWrong) {
+  const auto message = [&](const std::string& name, const std::string& contents) {
+    return message_of([&] { open_frames(file(name, contents).string()); });
+  };
+  const std::string cache = std::string("POINTCACHE2\0", 12) + bytes<std::int32_t>({1, 0, 0, 0, 1});
+  EXPECT_THAT(message("a.pc2", cache), AllOf(HasSubstr("a.pc2"), HasSubstr("0 points in 1 frames")));
+  const auto collection = [](const std::string& steps) {
+    return "<VTKFile type=\"Collection\"><Collection>" + steps + "</Collection></VTKFile>";
+  };
+  EXPECT_THAT(message("a.pvd", collection("<DataSet timestep=\"soon\" file=\"a.vtp\"/>")), HasSubstr("\"soon\""));
+  EXPECT_THAT(message("a.pvd", collection("<DataSet timestep=\"1\" file=\"a.vtp\"/>\n"
+                                          "<DataSet timestep=\"1\" file=\"b.vtp\"/>")),
+              AllOf(HasSubstr("b.vtp"), HasSubstr("one file a timestep")));
+  EXPECT_THAT(message_of([&] { open_frames(file("%d/a.obj").string()); }), HasSubstr("found it in the folder"));
+  EXPECT_THAT(message_of([&] { open_frames(file("%d_%d.obj").string()); }), HasSubstr("found two"));
+  EXPECT_THAT(message_of([&] { open_frames(folder_.string()); }),
+              AllOf(HasSubstr("found a folder"), HasSubstr("*.vtu")));
+  EXPECT_THAT(message_of([&] { read_points(folder_); }), HasSubstr("found a folder, expected a file"));
+}
+
+TEST_F(HostileFiles, BindingsKeepBlendsAndSettingsAndBelongToTheirShape) {
+  SavedBinding binding = whole_binding();
+  binding.settings = "{\"points\": 3}";
+  AdaptiveBlend& blend = binding.reconstruction->blend.emplace();
+  blend.averaging = binding.reconstruction->stencils;
+  blend.beyond.gdim = 2;
+  blend.prediction_share = 0.25;
+  blend.caution = {1, 2, 3, 0.1};
+  blend.edge_offsets = {0, 1, 2, 3, 4};
+  blend.edge_rows = {1, 2, 3, 0};
+  blend.edges = {1, 0, 0, 1, -1, 0, 0, -1};
+  write_binding(file("a.hgb"), binding);
+  const SavedBinding read = read_binding(file("a.hgb"), square, "print");
+  ASSERT_TRUE(read.reconstruction && read.reconstruction->blend);
+  EXPECT_EQ(read.reconstruction->blend->caution, blend.caution);
+  EXPECT_EQ(read.reconstruction->blend->edges, blend.edges);
+  EXPECT_EQ(read.reconstruction->blend->edge_rows, blend.edge_rows);
+  EXPECT_EQ(read.reconstruction->blend->prediction_share, 0.25);
+  EXPECT_EQ(read.reconstruction->blend->averaging.neighbors, blend.averaging.neighbors);
+  EXPECT_EQ(read_binding_settings(file("a.hgb")), binding.settings);
+  EXPECT_THAT(message_of([&] { read_binding(file("a.hgb"), square, "other"); }),
+              AllOf(HasSubstr("another rest mesh or other points"), HasSubstr("print"), HasSubstr("other")));
 }
 
 TEST_F(HostileFiles, DeeplyNestedJsonIsRefused) {

@@ -134,6 +134,17 @@ TEST(WeightedPoints, AreCheckedAndMarked) {
   EXPECT_THAT(message_of([&] { linear.gradient(mesh.vertices()); }), HasSubstr("smooth_gradient"));
   EXPECT_THAT(message_of([&] { Interpolant<double>(weights, named_rule("quadratic10"), nullptr); }),
               HasSubstr("simplices"));
+  const auto refused = [&](auto&& damage) {
+    WeightedPoints damaged = weights;
+    damage(damaged);
+    return message_of([&] { Interpolant<double>(damaged, named_rule("linear"), nullptr); });
+  };
+  EXPECT_THAT(refused([](WeightedPoints& w) { w.gdim = 5; }), HasSubstr("dimension 5: expected 1 to 4"));
+  EXPECT_THAT(refused([](WeightedPoints& w) { w.arms.pop_back(); }), HasSubstr("arms"));
+  EXPECT_THAT(refused([](WeightedPoints& w) { w.vertices[1] = 77; }), HasSubstr("vertex 77"));
+  auto planar = cells;
+  planar.vertices.conservativeResize(Eigen::NoChange, 2);
+  EXPECT_THAT(message_of([&] { cell_table(planar); }), HasSubstr("cells need vertices with 3 coordinates, found 2"));
   weights.weights[0] += 0.5;
   EXPECT_THAT(message_of([&] { Interpolant<double>(weights, named_rule("linear"), nullptr); }), HasSubstr("sum to"));
   std::get<0>(cells.blocks).cells(0, 0) = 99;

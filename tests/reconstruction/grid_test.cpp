@@ -135,6 +135,17 @@ TEST(Grid, RefusesWhatIsNoGrid) {
   EXPECT_THAT(message_of([] { Grid({regular(0, 0, 1)}); }), HasSubstr("0 cells along axis 0"));
   EXPECT_THAT(message_of([] { Grid({regular(2, 0, -1)}); }), HasSubstr("spacing -1"));
   EXPECT_THAT(message_of([] { Grid({graded({0, 1, 1})}); }), HasSubstr("plane 2 of axis 0"));
+  EXPECT_THAT(message_of([] {
+                GridAxis axis = graded({0, 1, 2});
+                axis.num_cells = 3;
+                Grid({axis});
+              }),
+              HasSubstr("3 planes for 3 cells along axis 0"));
+  EXPECT_THAT(message_of([] {
+                const Embedding flat = embed(Grid({regular(2, 0, 1), regular(2, 0, 1)}), Points::Constant(1, 2, 1));
+                Interpolant<double>(Grid({regular(2, 0, 1)}), flat, named_rule("linear"), nullptr);
+              }),
+              HasSubstr("in 2 dimensions, but the grid has 1"));
   EXPECT_THAT(message_of([] { Grid({regular(2, 0, 1)}, std::vector<GridPlace>{{2}}); }), HasSubstr("cell (2)"));
   EXPECT_THAT(message_of([] { Grid({regular(2, 0, 1)}, std::vector<GridPlace>{{1}, {1}}); }), HasSubstr("twice"));
   EXPECT_THAT(message_of([] {

@@ -6,12 +6,10 @@
 
 #include <cmath>
 
-#include "experiments/lattice.hpp"
-#include "experiments/point_source.hpp"
-#include "experiments/results.hpp"
 #include "framework/error.hpp"
 #include "reconstruction/cell_averages.hpp"
 #include "support/message_of.hpp"
+#include "support/test_meshes.hpp"
 
 namespace halfgrad {
 namespace {
@@ -19,12 +17,8 @@ namespace {
 using testing::HasSubstr;
 
 Mesh jittered(double size = 1) {
-  LatticeOptions options;
-  options.cells.fill(5);
-  options.size.fill(size);
-  options.jitter = 0.2;
-  options.seed = 3;
-  return make_lattice(options);
+  const Mesh mesh = test::lattice<Tetrahedron>(5, 0.2, 3);
+  return Mesh(mesh.vertices() * size, mesh.blocks());
 }
 
 ScatteredRule rule_named(const char* name) { return *find_scattered_rule(name); }
@@ -58,7 +52,7 @@ TEST(ScatteredTransfer, CarriesTranslationsWithAnyRuleAndAnyPoint) {
 
 TEST(ScatteredTransfer, GradientsMakeItAffineExactAndTheFitExactForQuadratics) {
   const Mesh mesh = jittered();
-  const Points points = random_points(mesh, 200, 1);
+  const Points points = test::random_points_inside(mesh, 200, 1);
   Eigen::Matrix3d A;
   A << 1.2, 0.3, -0.1, 0.2, 0.7, 0.4, -0.3, 0.1, 1.1;
   const Points turned = mesh.vertices() * A.transpose();
@@ -74,7 +68,7 @@ TEST(ScatteredTransfer, GradientsMakeItAffineExactAndTheFitExactForQuadratics) {
 TEST(ScatteredTransfer, ScalesWithTheMesh) {
   const Mesh mesh = jittered();
   const Mesh large(mesh.vertices() * 1000, mesh.blocks());
-  const Points points = random_points(mesh, 50, 2);
+  const Points points = test::random_points_inside(mesh, 50, 2);
   for (const NamedScatteredRule& named : scattered_rules()) {
     const auto weights = ScatteredTransfer(mesh, points, named.rule).matrix();
     const auto scaled = ScatteredTransfer(large, points * 1000, named.rule).matrix();
@@ -87,7 +81,7 @@ double halving_order(const ScatteredRule& rule, const VertexGradientReconstructo
   std::vector<double> errors;
   for (const double size : {1.0 / 32, 1.0 / 64}) {
     const Mesh mesh = jittered(size);
-    const Points points = random_points(mesh, 500, 4);
+    const Points points = test::random_points_inside(mesh, 500, 4);
     const auto field = [](const Points& X) {
       Points x = X;
       x.col(0) = (X.col(0).array() + 0.3 * (1 + 2 * X.col(1).array() + X.col(2).array()).sin()).matrix();
@@ -108,7 +102,7 @@ TEST(ScatteredTransfer, OrderIsOneForDisplacementsTwoWithGradientsThreeForTheFit
 
 TEST(ScatteredTransfer, RadiusGrowsUntilEnoughVerticesHaveWeight) {
   const Mesh mesh = jittered();
-  const Points points = random_points(mesh, 20, 5);
+  const Points points = test::random_points_inside(mesh, 20, 5);
   ScatteredRule rule;
   rule.radius = 1e-6;
   rule.neighbors = 7;
@@ -130,7 +124,7 @@ TEST(ScatteredTransfer, IgnoresVerticesOfNoCell) {
 
 TEST(ScatteredTransfer, RefusesWhatItCannotDo) {
   const Mesh mesh = jittered();
-  const Points points = random_points(mesh, 5, 1);
+  const Points points = test::random_points_inside(mesh, 5, 1);
   EXPECT_THAT(message_of([&] { ScatteredTransfer(mesh, points, carrying_gradients()); }), HasSubstr("reconstructor"));
   EXPECT_THAT(message_of([&] { ScatteredTransfer(mesh, points.leftCols(2), {}); }), HasSubstr("2 coordinates"));
   ScatteredRule rule;
