@@ -224,7 +224,7 @@ int dispatch(int argc, char** argv) {
       ->required();
   deform_app
       ->add_option("--tolerance", options.tolerance,
-                   "Length: cells that differ from linear by less are evaluated linearly")
+                   "Length: simplices that differ from linear by less are evaluated linearly")
       ->capture_default_str();
   deform_app
       ->add_option("--normals", options.normals,

@@ -33,7 +33,8 @@ enum class Kernel : std::uint8_t {
 };
 
 struct EvaluateOptions {
-  /// Length: cells whose quadratic correction is bounded by it are evaluated linearly. 0 evaluates every cell in full.
+  /// Length: simplices whose quadratic correction is bounded by it are evaluated linearly. 0 evaluates every cell in
+  /// full, as other cells always are.
   double tolerance = 0;
   Kernel kernel = Kernel::fast;
 };

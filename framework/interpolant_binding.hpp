@@ -194,7 +194,8 @@ struct Interpolant<Scalar>::Binding {
   template <Element E>
   bool is_linear(const Runs<E>& runs, Index run, const Values<Scalar>& gradients, Eigen::Index columns,
                  double tolerance) const {
-    if (!(tolerance > 0) || rule.formula != Formula::blend) return false;
+    // Elsewhere the test would cost more than it saves.
+    if (!E::affine || !(tolerance > 0) || rule.formula != Formula::blend) return false;
     if (!runs.extrapolates.empty() && runs.extrapolates[run]) return false;
     return correction_bound(runs, run, gradients, columns) <= tolerance;
   }

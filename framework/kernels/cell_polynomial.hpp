@@ -110,7 +110,7 @@ struct PointStage {
   const std::uint8_t* extrapolates;  ///< [run] 1 where a point lies outside its cell; null where none does
   const std::uint8_t* affine;        ///< [run] 1 where x(ξ) is affine; null for simplices, where it always is
   const Scalar* lines;
-  Scalar tolerance;  ///< > 0: cells whose correction is bounded by it are linear (recipe quadratic)
+  Scalar tolerance;  ///< > 0: simplices whose correction is bounded by it are linear (recipe quadratic)
   Scalar* out;       ///< [point][column], of the first point of the first run
 
   /// Runs [begin, end) by the fastest instructions of this machine; writes their points and nothing else. E must be

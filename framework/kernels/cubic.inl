@@ -22,7 +22,7 @@ HWY_INLINE void set_up_dual_taylor(const Spread<T, d>& spread, const T* const* l
   using M = SimplexMonomials<3, d>;
   constexpr int symmetric = num_symmetric(d);
   const auto store = [&](int place, const F& value)
-                         HWY_ATTR { spread.columns_of(value).store(coefficients + spread.size * place); };
+                         HALFGRAD_LAMBDA { spread.columns_of(value).store(coefficients + spread.size * place); };
   // Factors of the entries of Q, of which those off the diagonal count twice already, in u_kl.
   HWY_ALIGN T factor[symmetric][symmetric];
   HALFGRAD_UNROLL

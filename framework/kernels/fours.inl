@@ -15,6 +15,11 @@
 #define HALFGRAD_UNROLL _Pragma("GCC unroll 32")
 #endif
 
+#ifndef HALFGRAD_LAMBDA
+// Left alone, a lambda that two functions share is called, with its vectors in memory.
+#define HALFGRAD_LAMBDA HWY_ATTR __attribute__((always_inline))
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace halfgrad::kernels::HWY_NAMESPACE {
 

@@ -172,7 +172,7 @@ HWY_INLINE void evaluate_polynomials(const PointStage<T>& stage, const Spread<T,
     HALFGRAD_UNROLL
     for (int i = 0; i < Monomials::size; ++i) c[i] = Wide<T>::load(coefficients + Spread<T, Monomials::dim>::size * i);
     evaluate_points<Monomials::dim>(stage, spread, run, num_whole,
-                                    [&](const Wide<T>* xi) HWY_ATTR { return horner<Monomials, 0>(c, xi); });
+                                    [&](const Wide<T>* xi) HALFGRAD_LAMBDA { return horner<Monomials, 0>(c, xi); });
   }
 }
 
@@ -187,32 +187,6 @@ HWY_INLINE void find_lines(const PointStage<T>& stage, Index run, const T** line
   const Index* node = stage.nodes + static_cast<Offset>(run) * num_nodes;
   HALFGRAD_UNROLL
   for (int i = 0; i < num_nodes; ++i) line[i] = stage.lines + static_cast<Offset>(node[i]) * line_length;
-}
-
-// Whether a blend differs from linear interpolation by at most the tolerance everywhere in the cell: by at most
-// (1 − 1/n)/2 · |(H_i − H_j)(X_j − X_i)| for the pair of nodes where that is greatest (Binding::correction_bound). A
-// NaN is not bounded, nor is a cell with points outside.
-template <int num_nodes, int d, class T>
-HWY_NOINLINE bool is_within_tolerance(const PointStage<T>& stage, Index run) {
-  if (stage.extrapolates != nullptr && stage.extrapolates[run] != 0) return false;
-  const T* line[num_nodes];
-  find_lines<num_nodes, 4 * (1 + d)>(stage, run, line);
-  const T* rest = stage.rest + static_cast<Offset>(run) * num_nodes * d;
-  // Relative to it, so that squares of short lengths do not vanish in float.
-  const T per_longest = 1 / (stage.tolerance * 2 * num_nodes / (num_nodes - 1));
-  for (int i = 0; i < num_nodes; ++i)
-    for (int j = 0; j < i; ++j) {
-      T squared = 0;
-      for (int c = 0; c < stage.num_columns; ++c) {
-        T component = 0;
-        for (int k = 0; k < d; ++k)
-          component += (line[i][4 * (1 + k) + c] - line[j][4 * (1 + k) + c]) * (rest[j * d + k] - rest[i * d + k]);
-        component *= per_longest;
-        squared += component * component;
-      }
-      if (!(squared <= 1)) return false;
-    }
-  return true;
 }
 
 }  // namespace halfgrad::kernels::HWY_NAMESPACE

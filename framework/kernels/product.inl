@@ -17,7 +17,7 @@ namespace halfgrad::kernels::HWY_NAMESPACE {
 // sum + Σ_i B_mi items[i · stride]
 template <class E, int m, int stride, class Item, std::size_t... i>
 HWY_INLINE Item combination(const Item* items, Item sum, std::index_sequence<i...>) {
-  const auto add = [&]<std::size_t node>() HWY_ATTR {
+  const auto add = [&]<std::size_t node>() HALFGRAD_LAMBDA {
     constexpr int factor = E::shape_coefficients[m][node];
     if constexpr (factor == 1) sum = sum + items[node * stride];
     if constexpr (factor == -1) sum = sum - items[node * stride];
@@ -34,19 +34,18 @@ HWY_INLINE Item combination(const Item* items, Item zero) {
 // Calls f with std::integral_constant 0 … count − 1.
 template <int count, class Function>
 HWY_INLINE void unrolled(Function&& f) {
-  [&]<int... i>(std::integer_sequence<int, i...>) HWY_ATTR { (f(std::integral_constant<int, i>()), ...); }
+  [&]<int... i>(std::integer_sequence<int, i...>) HALFGRAD_LAMBDA { (f(std::integral_constant<int, i>()), ...); }
   (std::make_integer_sequence<int, count>());
 }
 
-// Linear interpolation; other coefficients than its own stay as they are.
-template <class E, Factor factor, class T>
+template <class E, class T>
 HWY_INLINE void set_up_shape(const Spread<T, E::dim>& spread, const T* const* line, T* coefficients) {
   using F = Four<T>;
-  using M = ProductMonomials<E, factor>;
+  using M = ProductMonomials<E, Factor::none>;
   F x[E::num_nodes];
   HALFGRAD_UNROLL
   for (int i = 0; i < E::num_nodes; ++i) x[i] = F::load(line[i]);
-  unrolled<M::num_shape>([&](auto m) HWY_ATTR {
+  unrolled<M::num_shape>([&](auto m) HALFGRAD_LAMBDA {
     spread.columns_of(combination<E, m()>(x, F::zero())).store(coefficients + spread.size * M::product(m(), 0));
   });
 }
@@ -69,7 +68,7 @@ HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* li
   // Y of the monomial 1 is zero.
   T y[M::num_shape][d];
   F g[M::num_shape][d];
-  unrolled<M::num_shape>([&](auto m) HWY_ATTR {
+  unrolled<M::num_shape>([&](auto m) HALFGRAD_LAMBDA {
     HALFGRAD_UNROLL
     for (int a = 0; a < d; ++a) {
       g[m()][a] = combination<E, m()>(h[a], F::zero());
@@ -77,11 +76,11 @@ HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* li
     }
   });
   // A coefficient at a time, so that its sum stays in a register.
-  unrolled<M::size>([&](auto place) HWY_ATTR {
+  unrolled<M::size>([&](auto place) HALFGRAD_LAMBDA {
     F sum = F::zero();
-    unrolled<M::num_shape>([&](auto m) HWY_ATTR {
+    unrolled<M::num_shape>([&](auto m) HALFGRAD_LAMBDA {
       if constexpr (M::product(m(), 0) == place()) sum = combination<E, m()>(moved, sum);
-      unrolled<M::num_shape>([&](auto other) HWY_ATTR {
+      unrolled<M::num_shape>([&](auto other) HALFGRAD_LAMBDA {
         if constexpr (other() > 0 && M::multiplies(other()) && M::product(m(), other()) == place()) {
           HALFGRAD_UNROLL
           for (int a = 0; a < d; ++a) sum = sum.plus(g[m()][a], y[other()][a]);
@@ -93,6 +92,22 @@ HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* li
 }
 
 // ---- runs
+
+template <class E, Factor factor, class T>
+HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, const Spread<T, E::dim>& given, Index begin,
+                                       Index end, Index num_whole) {
+  const Spread<T, E::dim> spread = given;  // a copy, so that stores to the results do not make it be read again
+  using Monomials = ProductMonomials<E, factor>;
+  constexpr int stride = spread.size * Monomials::size;
+  HWY_ALIGN T coefficients[batch_size * stride];
+  T* target = coefficients;
+  for (Index run = begin; run < end; ++run, target += stride) {
+    const T* line[E::num_nodes];
+    find_lines<E::num_nodes, 4 * (1 + E::dim)>(stage, run, line);
+    set_up_blend<E, factor>(spread, line, stage.rest + static_cast<Offset>(run) * E::num_nodes * E::dim, target);
+  }
+  evaluate_polynomials<Monomials>(stage, spread, begin, end, coefficients, stride, num_whole);
+}
 
 template <class E, class T>
 void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
@@ -107,42 +122,26 @@ void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
     for (Index run = batch; run < batch_end; ++run, target += stride) {
       const T* line[E::num_nodes];
       find_lines<E::num_nodes, 4>(stage, run, line);
-      set_up_shape<E, Factor::none>(spread, line, target);
+      set_up_shape<E>(spread, line, target);
     }
     evaluate_polynomials<Monomials>(stage, spread, batch, batch_end, coefficients, stride, num_whole);
   }
 }
 
-template <class E, Factor factor, class T>
-HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, Index begin, Index end, Index num_whole) {
-  using Monomials = ProductMonomials<E, factor>;
-  const Spread<T, E::dim> spread(stage.num_columns);
-  constexpr int stride = spread.size * Monomials::size;
-  HWY_ALIGN T coefficients[batch_size * stride];
-  T* target = coefficients;
-  for (Index run = begin; run < end; ++run, target += stride) {
-    const T* line[E::num_nodes];
-    find_lines<E::num_nodes, 4 * (1 + E::dim)>(stage, run, line);
-    if (HWY_UNLIKELY(stage.tolerance > 0) && is_within_tolerance<E::num_nodes, E::dim>(stage, run)) {
-      std::fill(target, target + stride, T(0));
-      set_up_shape<E, factor>(spread, line, target);
-    } else {
-      set_up_blend<E, factor>(spread, line, stage.rest + static_cast<Offset>(run) * E::num_nodes * E::dim, target);
-    }
-  }
-  evaluate_polynomials<Monomials>(stage, spread, begin, end, coefficients, stride, num_whole);
-}
-
 template <class E, class T>
-void evaluate_blend(const PointStage<T>& stage, Index begin, Index end) {
-  const Index num_whole = Spread<T, E::dim>(stage.num_columns).num_whole(stage, end);
-  for (Index batch = begin; batch < end; batch += batch_size) {
-    const Index batch_end = std::min(batch + batch_size, end);
-    const bool affine = std::all_of(stage.affine + batch, stage.affine + batch_end, [](auto a) { return a != 0; });
+HWY_NOINLINE void evaluate_blend(const PointStage<T>& stage, Index begin, Index end) {
+  const Spread<T, E::dim> spread(stage.num_columns);
+  const Index num_whole = spread.num_whole(stage, end);
+  // Neighbours that are evaluated alike make a batch, so that no cell's result depends on which cells it is among.
+  for (Index batch = begin, next; batch < end; batch = next) {
+    const bool affine = stage.affine[batch] != 0;
+    const Index limit = std::min(batch + batch_size, end);
+    for (next = batch + 1; next < limit && (stage.affine[next] != 0) == affine; ++next) {
+    }
     if (affine)
-      evaluate_blend_batch<E, Factor::affine>(stage, batch, batch_end, num_whole);
+      evaluate_blend_batch<E, Factor::affine>(stage, spread, batch, next, num_whole);
     else
-      evaluate_blend_batch<E, Factor::shape>(stage, batch, batch_end, num_whole);
+      evaluate_blend_batch<E, Factor::shape>(stage, spread, batch, next, num_whole);
   }
 }
 

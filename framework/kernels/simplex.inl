@@ -66,7 +66,7 @@ HWY_INLINE void evaluate_run(const PointStage<T>& stage, const Spread<T, d>& spr
         t[e] = W::load(from + spread.size) * ((stage.edges.reversed[run] >> e & 1) != 0 ? T(-1) : T(1));
     }
   }
-  evaluate_points<d>(stage, spread, run, num_whole, [&](const W* xi) HWY_ATTR {
+  evaluate_points<d>(stage, spread, run, num_whole, [&](const W* xi) HALFGRAD_LAMBDA {
     W value = x[0], beta[d + 1];
     beta[0] = W::all(T(1)) - xi[0];
     HALFGRAD_UNROLL
@@ -97,8 +97,8 @@ HWY_INLINE void evaluate_run(const PointStage<T>& stage, const Spread<T, d>& spr
   });
 }
 
-// Which of `count` edges have a bulge S that is_within_tolerance allows; what it asks of a cell's edges is asked once
-// an edge here.
+// Which of `count` edges have a bulge S within the tolerance: a blend differs from linear interpolation by at most
+// (1 − 1/n)/2 of the greatest in a cell of n nodes (Binding::correction_bound).
 template <int d, class T>
 void find_flat_edges(const PointStage<T>& stage, const T* vectors, Offset count, std::uint8_t* flat) {
   // Relative to the tolerance, so that squares of short lengths do not vanish in float. Lanes beyond the columns repeat

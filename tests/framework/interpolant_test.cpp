@@ -345,10 +345,14 @@ TYPED_TEST(InterpolantOn, ToleranceKeepsItsBound) {
     const Index skipped = interpolant.num_linear_cells(values, {.tolerance = tolerance});
     EXPECT_GE(skipped, before);
     before = skipped;
+    // Where the test would cost more than it saves, cells are evaluated in full.
+    if (!TypeParam::affine) {
+      EXPECT_EQ(result, full);
+    }
   }
-  EXPECT_EQ(before, interpolant.report().num_active_cells);
+  EXPECT_EQ(before, TypeParam::affine ? interpolant.report().num_active_cells : 0);
   EXPECT_EQ(interpolant.num_linear_cells(values, {}), 0);
-  EXPECT_LT(largest(interpolant.evaluate(values, {.tolerance = 10}) - linear), 1e-14);
+  EXPECT_LT(largest(interpolant.evaluate(values, {.tolerance = 10}) - (TypeParam::affine ? linear : full)), 1e-14);
 }
 
 TEST(Interpolant, OneAndTwoThreadsGiveTheSameBits) {

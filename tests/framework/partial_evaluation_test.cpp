@@ -68,6 +68,39 @@ TEST(PartialEvaluation, UpdatesEqualWholeFramesOnHexahedra) {
   for (const char* rule : {"linear", "phong"}) expect_updates_equal_whole_frames<Hexahedron>(rule);
 }
 
+// Cells whose map is affine are evaluated by fewer coefficients, whichever other cells are evaluated with them.
+template <Element E>
+void expect_updates_of_mixed_cells_equal_whole_frames() {
+  Scene<E> scene;
+  Points vertices = scene.mesh.vertices();
+  const Mesh regular = test::lattice<E>(6, 0, 5);
+  for (Index v = 0; v < regular.num_vertices(); ++v)
+    if (regular.vertices()(v, 0) > 0.4) vertices.row(v) = regular.vertices().row(v);
+  // Oblique, so that edges which are equal differ by rounding.
+  Eigen::MatrixXd oblique = Eigen::MatrixXd::Constant(E::dim, E::dim, 0.137);
+  for (int a = 0; a < E::dim; ++a) oblique(a, a) = 1 - 0.31 * a;
+  scene.mesh = test::transformed(Mesh(vertices, scene.mesh.blocks()), oblique, Eigen::VectorXd::Constant(E::dim, 0.71));
+  scene.values = scene.mesh.vertices().array().sin().matrix().template cast<float>();
+  scene.reconstruction =
+      ChandrashekarGarg().reconstruct(CellGradients(scene.mesh), active_vertices(scene.mesh, scene.embedding));
+  const Interpolant<float> interpolant = scene.bind("phong");
+  Values<float> out, expected;
+  Workspace<float> workspace, other;
+  interpolant.update_sorted(scene.values, out, workspace);
+  for (Index vertex = 0; vertex < scene.mesh.num_vertices(); ++vertex) {
+    scene.values(vertex, E::dim - 1) += 0.003f;
+    interpolant.update_sorted(scene.values, out, workspace);
+    interpolant.evaluate_sorted(scene.values, expected, other);
+    ASSERT_TRUE(out == expected) << vertex;
+  }
+}
+TEST(PartialEvaluation, UpdatesEqualWholeFramesOnQuadrilateralsOfTwoKinds) {
+  expect_updates_of_mixed_cells_equal_whole_frames<Quadrilateral>();
+}
+TEST(PartialEvaluation, UpdatesEqualWholeFramesOnHexahedraOfTwoKinds) {
+  expect_updates_of_mixed_cells_equal_whole_frames<Hexahedron>();
+}
+
 TEST(PartialEvaluation, UpdatesOfElementsWithoutAFastPathEvaluateAll) {
   Scene<Pyramid> scene;
   const Interpolant<float> interpolant = scene.bind("phong");
