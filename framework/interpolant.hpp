@@ -107,10 +107,11 @@ class Interpolant {
   Index update_sorted(const Values<Scalar>& values, Values<Scalar>& out, Workspace<Scalar>& workspace,
                       const EvaluateOptions& options = {}) const;
 
-  /// The vertex stage alone: F (and Q) of the active vertices in binding order, #active × (#columns · gdim), row =
-  /// component, column = axis.
+  /// The vertex stage alone: F of the active vertices in binding order, #active × (#columns · gdim), row = component,
+  /// column = axis.
   Values<Scalar> vertex_gradients(const Values<Scalar>& values) const;
-  Values<Scalar> vertex_hessians(const Values<Scalar>& values) const;
+  /// The same with Q, #active × (#columns · num_symmetric(gdim)), where the rule needs it; else `hessians` is empty.
+  void vertex_derivatives(const Values<Scalar>& values, Values<Scalar>& gradients, Values<Scalar>& hessians) const;
 
   /// The point stage alone, on gradients (and Hessians, or an empty matrix) given for the active vertices.
   void evaluate_given(const Values<Scalar>& values, const Values<Scalar>& gradients, const Values<Scalar>& hessians,

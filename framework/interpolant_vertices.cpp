@@ -100,22 +100,20 @@ void Interpolant<Scalar>::Binding::plain_vertex_stage(const Values<Scalar>& valu
 }
 
 template <class Scalar>
-Values<Scalar> Interpolant<Scalar>::vertex_gradients(const Values<Scalar>& values) const {
+void Interpolant<Scalar>::vertex_derivatives(const Values<Scalar>& values, Values<Scalar>& gradients,
+                                             Values<Scalar>& hessians) const {
   binding_->require_values(values);
   binding_->require_gradients();
+  if (!binding_->rule.needs_hessians()) hessians.resize(0, 0);
   Workspace<Scalar> workspace;
-  binding_->vertex_derivatives(values, Kernel::fast, workspace, workspace.gradients, workspace.hessians);
-  return std::move(workspace.gradients);
+  binding_->vertex_derivatives(values, Kernel::fast, workspace, gradients, hessians);
 }
 
 template <class Scalar>
-Values<Scalar> Interpolant<Scalar>::vertex_hessians(const Values<Scalar>& values) const {
-  binding_->require_values(values);
-  binding_->require_gradients();
-  if (!binding_->rule.needs_hessians()) raise("this interpolant keeps no vertex Hessians: only dual_taylor does");
-  Workspace<Scalar> workspace;
-  binding_->vertex_derivatives(values, Kernel::fast, workspace, workspace.gradients, workspace.hessians);
-  return std::move(workspace.hessians);
+Values<Scalar> Interpolant<Scalar>::vertex_gradients(const Values<Scalar>& values) const {
+  Values<Scalar> gradients, hessians;
+  vertex_derivatives(values, gradients, hessians);
+  return gradients;
 }
 
 template float* Interpolant<float>::Binding::pack_positions(const Values<float>&, Offset, Workspace<float>&) const;
@@ -124,13 +122,13 @@ template void Interpolant<float>::Binding::vertex_lines(const float*, const std:
 template void Interpolant<float>::Binding::vertex_derivatives(const Values<float>&, Kernel, Workspace<float>&,
                                                               Values<float>&, Values<float>&) const;
 template Values<float> Interpolant<float>::vertex_gradients(const Values<float>&) const;
-template Values<float> Interpolant<float>::vertex_hessians(const Values<float>&) const;
+template void Interpolant<float>::vertex_derivatives(const Values<float>&, Values<float>&, Values<float>&) const;
 template double* Interpolant<double>::Binding::pack_positions(const Values<double>&, Offset, Workspace<double>&) const;
 template void Interpolant<double>::Binding::vertex_lines(const double*, const std::array<double, 9>&,
                                                          Workspace<double>&, double*) const;
 template void Interpolant<double>::Binding::vertex_derivatives(const Values<double>&, Kernel, Workspace<double>&,
                                                                Values<double>&, Values<double>&) const;
 template Values<double> Interpolant<double>::vertex_gradients(const Values<double>&) const;
-template Values<double> Interpolant<double>::vertex_hessians(const Values<double>&) const;
+template void Interpolant<double>::vertex_derivatives(const Values<double>&, Values<double>&, Values<double>&) const;
 
 }  // namespace halfgrad

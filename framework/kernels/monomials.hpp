@@ -111,6 +111,23 @@ struct ProductMonomials {
       if (list_.items[static_cast<std::size_t>(i)] == exponents) return i;
     return -1;
   }
+  /// The monomial of the shape functions at a place, −1 where there is none.
+  static constexpr int shape_at(int place) {
+    for (int m = 0; m < num_shape; ++m)
+      if (product(m, 0) == place) return m;
+    return -1;
+  }
+  /// Pairs of a monomial m of the shape functions and a factor n > 0 whose product is at a place.
+  struct Pair {
+    int m, n;
+  };
+  static constexpr int num_pairs(int place) {
+    return pairs_.first[static_cast<std::size_t>(place) + 1] - pairs_.first[static_cast<std::size_t>(place)];
+  }
+  static constexpr Pair pair(int place, int index) {
+    return pairs_.items[static_cast<std::size_t>(pairs_.first[static_cast<std::size_t>(place)] + index)];
+  }
+
   /// Place of the product of two monomials of the shape functions.
   static constexpr int product(int m, int n) {
     Exponents<dim> sum{};
@@ -118,6 +135,29 @@ struct ProductMonomials {
       sum[k] = E::shape_monomials[static_cast<std::size_t>(m)][k] + E::shape_monomials[static_cast<std::size_t>(n)][k];
     return place(sum);
   }
+
+ private:
+  struct Pairs {
+    std::array<Pair, static_cast<std::size_t>(num_shape) * num_shape> items{};
+    std::array<int, static_cast<std::size_t>(size) + 1> first{};
+  };
+  static constexpr Pairs make_pairs() {
+    // Once a pair: compilers bound the steps of a constant.
+    std::array<int, static_cast<std::size_t>(num_shape) * num_shape> places{};
+    for (int m = 0; m < num_shape; ++m)
+      for (int n = 0; n < num_shape; ++n)
+        places[static_cast<std::size_t>(m * num_shape + n)] = n > 0 && multiplies(n) ? product(m, n) : -1;
+    Pairs result;
+    int count = 0;
+    for (int place = 0; place < size; ++place) {
+      for (int i = 0; i < num_shape * num_shape; ++i)
+        if (places[static_cast<std::size_t>(i)] == place)
+          result.items[static_cast<std::size_t>(count++)] = {i / num_shape, i % num_shape};
+      result.first[static_cast<std::size_t>(place) + 1] = count;
+    }
+    return result;
+  }
+  static constexpr Pairs pairs_ = make_pairs();
 };
 
 }  // namespace halfgrad::kernels

@@ -78,14 +78,11 @@ HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* li
   // A coefficient at a time, so that its sum stays in a register.
   unrolled<M::size>([&](auto place) HALFGRAD_LAMBDA {
     F sum = F::zero();
-    unrolled<M::num_shape>([&](auto m) HALFGRAD_LAMBDA {
-      if constexpr (M::product(m(), 0) == place()) sum = combination<E, m()>(moved, sum);
-      unrolled<M::num_shape>([&](auto other) HALFGRAD_LAMBDA {
-        if constexpr (other() > 0 && M::multiplies(other()) && M::product(m(), other()) == place()) {
-          HALFGRAD_UNROLL
-          for (int a = 0; a < d; ++a) sum = sum.plus(g[m()][a], y[other()][a]);
-        }
-      });
+    if constexpr (constexpr int m = M::shape_at(place()); m >= 0) sum = combination<E, m>(moved, sum);
+    unrolled<M::num_pairs(place())>([&](auto index) HALFGRAD_LAMBDA {
+      constexpr auto pair = M::pair(place(), index());
+      HALFGRAD_UNROLL
+      for (int a = 0; a < d; ++a) sum = sum.plus(g[pair.m][a], y[pair.n][a]);
     });
     spread.columns_of(sum).store(coefficients + spread.size * place());
   });

@@ -48,7 +48,7 @@ template <Recipe recipe, int line_length, int d, class T>
 HWY_INLINE void evaluate_run(const PointStage<T>& stage, const Spread<T, d>& spread, Index run, const T* vectors,
                              Index num_whole) {
   using W = Wide<T>;
-  constexpr int edges = num_edges(d), stride = num_edge_vectors<recipe> * spread.size;
+  constexpr int edges = num_edges(d), stride = num_edge_vectors<recipe> * Spread<T, d>::size;
   const Index* const node = stage.nodes + static_cast<Offset>(run) * (d + 1);
   W x[d + 1], s[edges], t[edges];
   HALFGRAD_UNROLL

@@ -451,11 +451,15 @@ TEST(Interpolant, MovesWithItsBinding) {
   EXPECT_EQ(second.evaluate(mesh.vertices()), before);
 }
 
-// At the apex of a pyramid the map of the cell is singular: the gradient there is the continuous one.
+// At a corner of a hexahedron where two nodes coincide its map is singular: the gradient there is the continuous one.
 TEST(Interpolant, GradientAtACollapsedCornerIsTheContinuousOne) {
-  const Mesh mesh = test::lattice<Pyramid>(1, 0, 1);
-  const Points apex = Points::Constant(1, 3, 0.5);
-  const Embedding embedding = embed(mesh, apex);
+  const Mesh cube = test::lattice<Hexahedron>(1, 0, 1);
+  const std::span<const Index> nodes = cube.cell_vertices(0);
+  Points vertices = cube.vertices();
+  vertices.row(nodes[7]) = vertices.row(nodes[6]);
+  const Mesh mesh(vertices, cube.blocks());
+  Embedding embedding = embed(mesh, vertices.row(nodes[0]));
+  embedding.local.row(0) = Hexahedron::nodes().row(6);
   const Reconstruction rows = reconstruct(mesh, embedding);
   const Interpolant<double> interpolant(mesh, embedding, named_rule("phong"), &rows);
   const Values<double> values = mesh.vertices() * Eigen::Vector3d(1, -2, 3);
