@@ -38,8 +38,7 @@ using NodeMatrix = Eigen::Matrix<double, E::num_nodes, E::dim>;
 /// vtk_id               the VTK cell type; node order is VTK's but for the wedge, and makes det ∂x/∂ξ positive
 /// dim                  dimension of the reference cell
 /// num_nodes            number of nodes, which are the cell's corners
-/// affine               true where x(ξ) is affine for any node positions: simplices, node 0 the origin, the others the
-///                      unit points in order
+/// affine               true where x(ξ) is affine for any node positions (simplices)
 /// reference_volume     volume of the reference cell
 /// facets               std::array<Facet, n>: the sides, by local node
 /// nodes()              num_nodes × dim, reference coordinates of the nodes

@@ -27,50 +27,9 @@ struct CellTable {
   std::vector<char> boundary;           ///< one a vertex, 1 on a facet of one cell only
 };
 
-/// Geometry of a simplex by its node positions. What cell_gradient would compute, but half of its products are with
-/// zeros and ones there, and its matrices are copies through memory: 1.8 times the time.
-template <Element E>
-CellGradient simplex_gradient(const NodeMatrix<E>& positions) {
-  constexpr int D = E::dim;
-  Eigen::Matrix<double, D, D> jacobian;
-  CellGradient result;
-  result.centroid.resize(D);
-  ReferencePoint<E> extent;
-  for (int a = 0; a < D; ++a) {
-    double low = 0, high = 0, sum = 0;
-    for (int k = 0; k < D; ++k) {
-      const double edge = positions(k + 1, a) - positions(0, a);
-      jacobian(a, k) = edge;
-      low = std::min(low, edge);
-      high = std::max(high, edge);
-      sum += edge;
-    }
-    extent[a] = high - low;
-    result.centroid[a] = positions(0, a) + sum / (D + 1);
-  }
-  result.weights.resize(D + 1, D);
-  const double determinant = jacobian.determinant();
-  if (is_degenerate<E>(extent, determinant)) {
-    result.weights.setZero();
-    return result;
-  }
-  result.volume = std::abs(determinant) * E::reference_volume;
-  const Eigen::Matrix<double, D, D> inverse = refined_inverse<D>(jacobian);
-  for (int a = 0; a < D; ++a) {
-    double sum = 0;
-    for (int k = 0; k < D; ++k) {
-      result.weights(k + 1, a) = inverse(k, a);
-      sum += inverse(k, a);
-    }
-    result.weights(0, a) = -sum;
-  }
-  return result;
-}
-
 /// Geometry of one cell of type E by its node positions.
 template <Element E>
 CellGradient cell_gradient(const NodeMatrix<E>& positions) {
-  if constexpr (E::affine) return simplex_gradient<E>(positions);
   const NodeMatrix<E> derivative = E::shape_gradient(E::center());
   CellGradient result;
   // Differences to the first node keep the digits of cells far from the origin.

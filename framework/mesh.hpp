@@ -78,7 +78,7 @@ Eigen::Matrix<double, E::num_nodes, E::dim> node_positions(const Mesh& mesh, con
                                                            Eigen::Index row) {
   Eigen::Matrix<double, E::num_nodes, E::dim> positions;
   for (int i = 0; i < E::num_nodes; ++i)
-    for (int a = 0; a < E::dim; ++a) positions(i, a) = mesh.vertices()(block.cells(row, i), a);
+    positions.row(i) = mesh.vertices().row(block.cells(row, i)).template head<E::dim>();
   return positions;
 }
 

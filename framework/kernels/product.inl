@@ -93,8 +93,8 @@ HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* li
 template <class E, Factor factor, class T>
 HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, const Spread<T, E::dim>& given, Index begin,
                                        Index end, Index num_whole) {
-  const Spread<T, E::dim> spread = given;  // a copy, so that stores to the results do not make it be read again
   using Monomials = ProductMonomials<E, factor>;
+  const Spread<T, E::dim> spread = given;  // a copy, so that stores to the results do not make it be read again
   constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
   T* target = coefficients;
@@ -132,9 +132,9 @@ HWY_NOINLINE void evaluate_blend(const PointStage<T>& stage, Index begin, Index 
   // Neighbours that are evaluated alike make a batch, so that no cell's result depends on which cells it is among.
   for (Index batch = begin, next; batch < end; batch = next) {
     const bool affine = stage.affine[batch] != 0;
-    const Index limit = std::min(batch + batch_size, end);
-    for (next = batch + 1; next < limit && (stage.affine[next] != 0) == affine; ++next) {
-    }
+    const auto* const limit = stage.affine + std::min(batch + batch_size, end);
+    next = static_cast<Index>(
+        std::find_if(stage.affine + batch, limit, [&](auto other) { return (other != 0) != affine; }) - stage.affine);
     if (affine)
       evaluate_blend_batch<E, Factor::affine>(stage, spread, batch, next, num_whole);
     else

@@ -129,18 +129,6 @@ TYPED_TEST_P(ElementContract, GradientIsTheDerivativeOfShape) {
   }
 }
 
-TYPED_TEST_P(ElementContract, IsTheUnitSimplexWhereAffine) {
-  using E = TypeParam;
-  if constexpr (E::affine) {
-    NodeMatrix<E> unit = NodeMatrix<E>::Zero();
-    unit.template bottomRows<E::dim>().setIdentity();
-    EXPECT_EQ(E::nodes(), unit);
-    NodeMatrix<E> slope = unit;
-    slope.row(0).setConstant(-1);
-    EXPECT_EQ(E::shape_gradient(E::center()), slope);
-  }
-}
-
 TYPED_TEST_P(ElementContract, CellGradientIsThatOfTheShapeFunctionsAtTheCenter) {
   using E = TypeParam;
   std::mt19937 random(5);
@@ -246,7 +234,7 @@ TYPED_TEST_P(ElementContract, PhongReproducesQuadraticsFromExactGradients) {
 
 REGISTER_TYPED_TEST_SUITE_P(ElementContract, SatisfiesTheConcept, ShapeIsOneAtItsNodeAndZeroAtOthers,
                             WeightsSumToOneAndReproducePosition, PolynomialsAreTheShapeFunctions,
-                            CubeCollapsesOntoTheCell, GradientIsTheDerivativeOfShape, IsTheUnitSimplexWhereAffine,
+                            CubeCollapsesOntoTheCell, GradientIsTheDerivativeOfShape,
                             CellGradientIsThatOfTheShapeFunctionsAtTheCenter, MarginIsZeroAtNodesAndPositiveAtTheCenter,
                             FacetsLieOnTheBoundaryAndCoverEveryNode, ReferenceVolumeIsTheShareOfTheNodesBox,
                             InverseMapReturnsToThePoint, PhongReproducesQuadraticsFromExactGradients);
