@@ -110,6 +110,14 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
   };
   auto phong_lean = bound_with(Kriging({.patch = KrigingPatch::lean}), "phong");
   auto phong_kriging = bound_with(Kriging(), "phong"), phong_adaptive = bound_with(Adaptive(), "phong");
+  // Hessians of no meaning on the same stencils: what dual_taylor costs next to phong.
+  Reconstruction with_hessians = reconstruction;
+  with_hessians.stencils.hessian_weights.assign(
+      static_cast<std::size_t>(num_symmetric(mesh.gdim()) * reconstruction.stencils.num_entries()), 0);
+  Frame<float> hermite = bound(float(), "hermite", embedding);
+  Frame<float> dual_taylor{Interpolant<float>(mesh, embedding, named_rule("dual_taylor"), &with_hessians), {}, {}};
+  Frame<float> dual_taylor_kriging = bound_with(Kriging({.drift = KrigingDrift::cubic}), "dual_taylor");
+  Frame<float> phong_kriging_cubic = bound_with(Kriging({.drift = KrigingDrift::cubic}), "phong");
   const Values<float> values = workload.deformed.cast<float>();
   MovingTenth moving(mesh.vertices(), values);
 
@@ -123,6 +131,10 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
       {"phong_lean", frames, [&] { phong_lean.sorted(values); }},
       {"phong_kriging", frames, [&] { phong_kriging.sorted(values); }},
       {"phong_adaptive", frames, [&] { phong_adaptive.sorted(values); }},
+      {"hermite", frames, [&] { hermite.sorted(values); }},
+      {"dual_taylor", frames, [&] { dual_taylor.sorted(values); }},
+      {"phong_kriging_cubic", frames, [&] { phong_kriging_cubic.sorted(values); }},
+      {"dual_taylor_kriging", frames, [&] { dual_taylor_kriging.sorted(values); }},
       {"phong_double", frames, [&] { phong_double.sorted(workload.deformed); }},
       {"linear_user_order", frames, [&] { linear_user.user_order(values); }},
       {"phong_user_order", frames, [&] { phong_user.user_order(values); }},
@@ -150,21 +162,9 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
   const bool all_tetrahedra = mesh.blocks().size() == 1 && element_name(mesh, 0) == Tetrahedron::name;
   std::optional<ScalarLinear> scalar_linear;
   std::optional<PaperStyle> paper_style;
-  std::optional<Frame<float>> hermite, dual_taylor, dual_taylor_kriging;
   if (all_tetrahedra) {
     scalar_linear.emplace(mesh, embedding);
     paper_style.emplace(mesh, embedding, workload.points);
-    hermite.emplace(bound(float(), "hermite", embedding));
-    // Hessians of no meaning on the same stencils: what dual_taylor costs next to phong.
-    Reconstruction with_hessians = reconstruction;
-    with_hessians.stencils.hessian_weights.assign(6 * static_cast<std::size_t>(reconstruction.stencils.num_entries()),
-                                                  0);
-    dual_taylor.emplace(
-        Frame<float>{Interpolant<float>(mesh, embedding, named_rule("dual_taylor"), &with_hessians), {}, {}});
-    dual_taylor_kriging.emplace(bound_with(Kriging({.drift = KrigingDrift::cubic}), "dual_taylor"));
-    operations.push_back({"dual_taylor_kriging", frames, [&] { dual_taylor_kriging->sorted(values); }});
-    operations.push_back({"hermite", frames, [&] { hermite->sorted(values); }});
-    operations.push_back({"dual_taylor", frames, [&] { dual_taylor->sorted(values); }});
     operations.push_back({"scalar_linear", frames, [&] { scalar_linear->evaluate(values.data(), copied.data()); }});
     operations.push_back({"paper_style", 1, [&] { paper_style->evaluate(values.data(), copied.data()); }});
   }
