@@ -25,14 +25,24 @@ struct Pyramid {
       {{4, {0, 3, 2, 1}}, {3, {0, 1, 4}}, {3, {1, 2, 4}}, {3, {2, 3, 4}}, {3, {3, 0, 4}}}};
   static constexpr std::array<int, 8> cube_nodes = {0, 1, 3, 2, 4, 4, 4, 4};
 
+  static constexpr int num_variables = 4;
+  static constexpr std::array<std::array<int, 4>, 5> shape_monomials = {
+      {{0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+  static constexpr std::array<std::array<double, 5>, 5> shape_coefficients = {
+      {{1, 0, 0, 0, 0}, {-1, 1, 0, 0, 0}, {-1, 0, 0, 1, 0}, {0, -0.5, 0, -0.5, 1}, {1, -1, 1, -1, 0}}};
+
   static Eigen::Matrix<double, 5, 3> nodes() {
     return (Eigen::Matrix<double, 5, 3>() << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0.5, 0.5, 1).finished();
   }
   static Eigen::Vector3d center() { return {0.5, 0.5, 0.25}; }
-  static Eigen::Matrix<double, 5, 1> shape(const Eigen::Vector3d& xi) {
+  /// ξ and ab/w.
+  static Eigen::Vector4d variables(const Eigen::Vector3d& xi) {
     const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2;
     // Any value of the rational term keeps Σβ = 1 and Σβ_i node_i = ξ; at the apex it is zero.
-    const double rational = w > apex ? a * b / w : 0;
+    return {xi[0], xi[1], xi[2], w > apex ? a * b / w : 0};
+  }
+  static Eigen::Matrix<double, 5, 1> shape(const Eigen::Vector3d& xi) {
+    const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2, rational = variables(xi)[3];
     Eigen::Matrix<double, 5, 1> beta;
     beta << w - a - b + rational, a - rational, rational, b - rational, xi[2];
     return beta;

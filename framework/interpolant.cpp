@@ -178,7 +178,7 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
   const FastRule fast = fast_rule(rule);
   workspace.holds = nullptr;
   const auto is_fast = [&]<class E>(const Runs<E>&) {
-    return kernels::has_fast_path<E>(fast.recipe) && options.kernel == Kernel::fast && is_fast_width(values.cols());
+    return kernels::has_fast_path<E> && options.kernel == Kernel::fast && is_fast_width(values.cols());
   };
   // Where a point lies outside a cell that is no simplex, its value is not the cell's polynomial.
   const auto has_plain_runs = [&]<class E>(const Runs<E>& runs) {
@@ -247,7 +247,7 @@ bool Interpolant<Scalar>::Binding::all_fast(Eigen::Index columns, Kernel kernel)
   return std::all_of(blocks.begin(), blocks.end(), [&](const AnyRuns& any) {
     return std::visit(
         [&]<class E>(const Runs<E>& runs) {
-          return kernels::has_fast_path<E>(fast_rule(rule).recipe) && (E::affine || runs.extrapolates.empty());
+          return kernels::has_fast_path<E> && (E::affine || runs.extrapolates.empty());
         },
         any);
   });

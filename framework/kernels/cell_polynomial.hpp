@@ -1,6 +1,7 @@
-// The fast path: on a cell every interpolant is one polynomial in ξ, set up a cell and a frame at a time and evaluated
-// with as many points at once as the machine's vectors have lanes. On simplices ξ are barycentric coordinates and every
-// rule is served; on other elements with polynomial shape functions the linear rule and the blends are.
+// The fast path: on a cell every interpolant is one polynomial in the element's variables (ξ; on a simplex these are
+// barycentric coordinates), set up a cell and a frame at a time and evaluated with as many points at once as the
+// machine's vectors have lanes. Under the rules of degree three, cells that are no simplices have more coefficients
+// than pay (64 on a hexahedron): there each lane is a point, at which the formula is evaluated.
 //
 // Data, all in units of Scalar unless said; "four" is a vector of four that holds the 1 … 3 columns, padded with zeros:
 //
@@ -11,7 +12,7 @@
 //                               of x_j − x_v; the vertex itself with weights of zero fills the last group
 //   nodes      [run][node]      number of the vertex; a run is the points of one cell
 //   rest       [run][node][axis] X_i − X_0
-//   local      [point][axis]    ξ_1 … ξ_d
+//   local      [point][variable] ξ_1 … ξ_d, then what other variables the element has
 //   edges      of simplices: each edge once a window of window_size runs
 //     first    [window]         its first edge
 //     ends     [edge][2]        numbers of the vertices i, j
@@ -27,9 +28,9 @@
 // Coefficients of cells that are not evaluated edge by edge stand in the order that monomials.hpp gives, a vector each,
 // for a batch of cells in a buffer of the first cache level.
 //
-// Sources: vertex_stage.inl, simplex.inl, cubic.inl (simplices with Hessians), product.inl (elements that are no
-// simplices), each compiled for float and double by a file of its own and, in it, once for every instruction set;
-// fours.inl and points.inl are what they share.
+// Sources: vertex_stage.inl, simplex.inl, cubic.inl (simplices with Hessians), product.inl and lanes.inl (elements that
+// are no simplices), each compiled for float and double by a file of its own and, in it, once for every instruction
+// set; fours.inl and points.inl are what they share.
 #pragma once
 
 #include <array>
@@ -108,7 +109,7 @@ struct PointStage {
   const Scalar* local;
   Edges<Scalar> edges;               ///< of simplices under the recipes quadratic and hermite
   const std::uint8_t* extrapolates;  ///< [run] 1 where a point lies outside its cell; null where none does
-  const std::uint8_t* affine;        ///< [run] 1 where x(ξ) is affine; null for simplices, where it always is
+  const std::uint8_t* affine;        ///< [run] 1 where x(ξ) is affine; of polynomial elements but simplices
   const Scalar* lines;
   Scalar tolerance;  ///< > 0: simplices whose correction is bounded by it are linear (recipe quadratic)
   Scalar* out;       ///< [point][column], of the first point of the first run
@@ -117,9 +118,12 @@ struct PointStage {
   /// an element for which has_fast_path holds.
   template <Element E>
   void run(Index begin, Index end) const {
-    if constexpr (!E::affine)
-      run_product(E::vtk_id, begin, end);
-    else if (recipe == Recipe::dual_taylor)
+    if constexpr (!E::affine) {
+      if (recipe == Recipe::linear || recipe == Recipe::quadratic)
+        run_product(E::vtk_id, begin, end);
+      else
+        run_lanes(E::vtk_id, begin, end);
+    } else if (recipe == Recipe::dual_taylor)
       run_cubic(E::dim, begin, end);
     else
       run_simplex(E::dim, begin, end);
@@ -129,15 +133,11 @@ struct PointStage {
   void run_simplex(int dim, Index begin, Index end) const;
   void run_cubic(int dim, Index begin, Index end) const;
   void run_product(int vtk_id, Index begin, Index end) const;
+  void run_lanes(int vtk_id, Index begin, Index end) const;
 };
 
-/// Whether the fast path serves an element under a recipe.
+/// Whether the fast path serves an element.
 template <Element E>
-constexpr bool has_fast_path(Recipe recipe) {
-  if constexpr (E::affine)
-    return E::dim <= max_simplex_dim;
-  else
-    return PolynomialElement<E> && (recipe == Recipe::linear || recipe == Recipe::quadratic);
-}
+inline constexpr bool has_fast_path = E::affine ? E::dim <= max_simplex_dim : MonomialElement<E>;
 
 }  // namespace halfgrad::kernels

@@ -8,6 +8,8 @@
 
 #include <hwy/highway.h>
 
+#include <utility>
+
 #include "framework/kernels/cell_polynomial.hpp"
 
 #ifndef HALFGRAD_UNROLL
@@ -24,6 +26,13 @@ HWY_BEFORE_NAMESPACE();
 namespace halfgrad::kernels::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
+
+// Calls f with std::integral_constant 0 … count − 1.
+template <int count, class Function>
+HWY_INLINE void unrolled(Function&& f) {
+  [&]<int... i>(std::integer_sequence<int, i...>) HALFGRAD_LAMBDA { (f(std::integral_constant<int, i>()), ...); }
+  (std::make_integer_sequence<int, count>());
+}
 
 // `size` numbers in one vector, or in several where the target's vectors are shorter.
 template <class T, int size>

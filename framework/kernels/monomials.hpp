@@ -9,7 +9,7 @@
 
 namespace halfgrad::kernels {
 
-/// Exponents of a monomial in ξ.
+/// Exponents of a monomial.
 template <int d>
 using Exponents = std::array<int, d>;
 
@@ -65,14 +65,16 @@ struct SimplexMonomials {
 /// What the shape functions of a polynomial element are multiplied with.
 enum class Factor : std::uint8_t {
   none,    ///< linear interpolation: Σ β_i x_i
-  affine,  ///< a blend on a cell whose x(ξ) is affine (a parallelepiped): X − X_i is affine in ξ
+  affine,  ///< a blend on a cell of a PolynomialElement whose x(ξ) is affine (a parallelepiped): so is X − X_i
   shape    ///< a blend on any cell: X − X_i is in the span of the shape functions
 };
 
-/// Monomials of the shape functions of E, multiplied as `factor` says; stored in ascending order of their exponents.
-template <PolynomialElement E, Factor factor>
+/// Monomials of the shape functions of E in its variables, multiplied as `factor` says; stored in ascending order of
+/// their exponents.
+template <MonomialElement E, Factor factor>
 struct ProductMonomials {
-  static constexpr int dim = E::dim;
+  /// Number of variables.
+  static constexpr int dim = num_variables<E>;
   static constexpr int num_shape = static_cast<int>(E::shape_monomials.size());
 
   /// Whether the shape functions are multiplied with their monomial n.

@@ -56,7 +56,8 @@ class Spread {
     if constexpr (single) return four;
   }
 
-  // ξ_1 … ξ_d of num_points points, of which `local` is the first; reads a whole vector.
+  // The d coordinates (variables of the element) of num_points points, of which `local` is the first; reads a whole
+  // vector.
   HWY_INLINE void coordinates(const T* local, W* xi) const {
     if constexpr (single) {
       HALFGRAD_UNROLL

@@ -1,8 +1,8 @@
-// Elements with polynomial shape functions that are no simplices, under the linear rule and the blends. A source file
-// defines HALFGRAD_SCALAR and HWY_TARGET_INCLUDE, then includes this one; Highway includes that source once a target.
+// Elements that are no simplices, under the linear rule and the blends. A source file defines HALFGRAD_SCALAR and
+// HWY_TARGET_INCLUDE, then includes this one; Highway includes that source once a target.
 //
-// With shape functions β_i = Σ_m B_mi ξ^m the cell's map is X(ξ) − X_0 = Σ_n Y_n ξ^n, and
-//   f = Σ_i β_i (x_i + H_i (X − X_i)) = Σ_m ξ^m (w_m + Σ_n G_m Y_n ξ^n)
+// With shape functions β_i = Σ_m B_mi η^m of the element's variables η the cell's map is X(η) − X_0 = Σ_n Y_n η^n, and
+//   f = Σ_i β_i (x_i + H_i (X − X_i)) = Σ_m η^m (w_m + Σ_n G_m Y_n η^n)
 // with G_m = Σ_i B_mi H_i, w_m = Σ_i B_mi (x_i − H_i (X_i − X_0)), Y_n = Σ_i B_ni (X_i − X_0). Y_n vanishes for n of
 // degree two and more where x(ξ) is affine: a hexahedron then has 20 coefficients instead of 27.
 #include <hwy/foreach_target.h>
@@ -18,10 +18,13 @@ namespace halfgrad::kernels::HWY_NAMESPACE {
 template <class E, int m, int stride, class Item, std::size_t... i>
 HWY_INLINE Item combination(const Item* items, Item sum, std::index_sequence<i...>) {
   const auto add = [&]<std::size_t node>() HALFGRAD_LAMBDA {
-    constexpr int factor = E::shape_coefficients[m][node];
-    if constexpr (factor == 1) sum = sum + items[node * stride];
-    if constexpr (factor == -1) sum = sum - items[node * stride];
-    static_assert(factor >= -1 && factor <= 1);
+    constexpr auto factor = static_cast<HALFGRAD_SCALAR>(E::shape_coefficients[m][node]);
+    if constexpr (factor == 1)
+      sum = sum + items[node * stride];
+    else if constexpr (factor == -1)
+      sum = sum - items[node * stride];
+    else if constexpr (factor != 0)
+      sum = sum + items[node * stride] * factor;
   };
   (add.template operator()<i>(), ...);
   return sum;
@@ -31,15 +34,8 @@ HWY_INLINE Item combination(const Item* items, Item zero) {
   return combination<E, m, stride>(items, zero, std::make_index_sequence<E::num_nodes>());
 }
 
-// Calls f with std::integral_constant 0 … count − 1.
-template <int count, class Function>
-HWY_INLINE void unrolled(Function&& f) {
-  [&]<int... i>(std::integer_sequence<int, i...>) HALFGRAD_LAMBDA { (f(std::integral_constant<int, i>()), ...); }
-  (std::make_integer_sequence<int, count>());
-}
-
 template <class E, class T>
-HWY_INLINE void set_up_shape(const Spread<T, E::dim>& spread, const T* const* line, T* coefficients) {
+HWY_INLINE void set_up_shape(const Spread<T, num_variables<E>>& spread, const T* const* line, T* coefficients) {
   using F = Four<T>;
   using M = ProductMonomials<E, Factor::none>;
   F x[E::num_nodes];
@@ -51,7 +47,8 @@ HWY_INLINE void set_up_shape(const Spread<T, E::dim>& spread, const T* const* li
 }
 
 template <class E, Factor factor, class T>
-HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* line, const T* rest, T* coefficients) {
+HWY_INLINE void set_up_blend(const Spread<T, num_variables<E>>& spread, const T* const* line, const T* rest,
+                             T* coefficients) {
   using F = Four<T>;
   using M = ProductMonomials<E, factor>;
   constexpr int n = E::num_nodes, d = E::dim;
@@ -91,10 +88,11 @@ HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* li
 // ---- runs
 
 template <class E, Factor factor, class T>
-HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, const Spread<T, E::dim>& given, Index begin,
-                                       Index end, Index num_whole) {
+HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, const Spread<T, num_variables<E>>& given,
+                                       Index begin, Index end, Index num_whole) {
   using Monomials = ProductMonomials<E, factor>;
-  const Spread<T, E::dim> spread = given;  // a copy, so that stores to the results do not make it be read again
+  const Spread<T, num_variables<E>> spread =
+      given;  // a copy, so that stores to the results do not make it be read again
   constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
   T* target = coefficients;
@@ -109,7 +107,7 @@ HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, const Spread<
 template <class E, class T>
 void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
   using Monomials = ProductMonomials<E, Factor::none>;
-  const Spread<T, E::dim> spread(stage.num_columns);
+  const Spread<T, num_variables<E>> spread(stage.num_columns);
   constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
   const Index num_whole = spread.num_whole(stage, end);
@@ -127,24 +125,28 @@ void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
 
 template <class E, class T>
 HWY_NOINLINE void evaluate_blend(const PointStage<T>& stage, Index begin, Index end) {
-  const Spread<T, E::dim> spread(stage.num_columns);
+  const Spread<T, num_variables<E>> spread(stage.num_columns);
   const Index num_whole = spread.num_whole(stage, end);
   // Neighbours that are evaluated alike make a batch, so that no cell's result depends on which cells it is among.
   for (Index batch = begin, next; batch < end; batch = next) {
-    const bool affine = stage.affine[batch] != 0;
-    const auto* const limit = stage.affine + std::min(batch + batch_size, end);
-    next = static_cast<Index>(
-        std::find_if(stage.affine + batch, limit, [&](auto other) { return (other != 0) != affine; }) - stage.affine);
-    if (affine)
-      evaluate_blend_batch<E, Factor::affine>(stage, spread, batch, next, num_whole);
-    else
-      evaluate_blend_batch<E, Factor::shape>(stage, spread, batch, next, num_whole);
+    next = std::min(batch + batch_size, end);
+    if constexpr (PolynomialElement<E>) {
+      const bool affine = stage.affine[batch] != 0;
+      next = static_cast<Index>(
+          std::find_if(stage.affine + batch, stage.affine + next, [&](auto other) { return (other != 0) != affine; }) -
+          stage.affine);
+      if (affine) {
+        evaluate_blend_batch<E, Factor::affine>(stage, spread, batch, next, num_whole);
+        continue;
+      }
+    }
+    evaluate_blend_batch<E, Factor::shape>(stage, spread, batch, next, num_whole);
   }
 }
 
 void product_points(const PointStage<HALFGRAD_SCALAR>& stage, int vtk_id, Index begin, Index end) {
   Elements::for_each([&]<class E>() {
-    if constexpr (PolynomialElement<E> && !E::affine) {
+    if constexpr (MonomialElement<E> && !E::affine) {
       if (E::vtk_id != vtk_id) return;
       if (stage.recipe == Recipe::linear)
         evaluate_linear<E>(stage, begin, end);

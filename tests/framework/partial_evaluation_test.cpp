@@ -62,10 +62,13 @@ TEST(PartialEvaluation, UpdatesEqualWholeFramesOnTetrahedra) {
   for (const char* rule : {"linear", "phong", "hermite"}) expect_updates_equal_whole_frames<Tetrahedron>(rule);
 }
 TEST(PartialEvaluation, UpdatesEqualWholeFramesOnQuadrilaterals) {
-  for (const char* rule : {"linear", "phong"}) expect_updates_equal_whole_frames<Quadrilateral>(rule);
+  for (const char* rule : {"linear", "phong", "hermite"}) expect_updates_equal_whole_frames<Quadrilateral>(rule);
 }
 TEST(PartialEvaluation, UpdatesEqualWholeFramesOnHexahedra) {
-  for (const char* rule : {"linear", "phong"}) expect_updates_equal_whole_frames<Hexahedron>(rule);
+  for (const char* rule : {"linear", "phong", "hermite"}) expect_updates_equal_whole_frames<Hexahedron>(rule);
+}
+TEST(PartialEvaluation, UpdatesEqualWholeFramesOnPyramids) {
+  for (const char* rule : {"linear", "phong", "hermite"}) expect_updates_equal_whole_frames<Pyramid>(rule);
 }
 
 // Cells whose map is affine are evaluated by fewer coefficients, whichever other cells are evaluated with them.
@@ -101,8 +104,10 @@ TEST(PartialEvaluation, UpdatesEqualWholeFramesOnHexahedraOfTwoKinds) {
   expect_updates_of_mixed_cells_equal_whole_frames<Hexahedron>();
 }
 
-TEST(PartialEvaluation, UpdatesOfElementsWithoutAFastPathEvaluateAll) {
-  Scene<Pyramid> scene;
+TEST(PartialEvaluation, UpdatesWithPointsOutsideHexahedraEvaluateAll) {
+  Scene<Hexahedron> scene;
+  scene.embedding.status[7] = PointStatus::outside;
+  scene.embedding.outside.push_back({7, 0.1, Vector::Constant(3, 0.05)});
   const Interpolant<float> interpolant = scene.bind("phong");
   Values<float> out;
   Workspace<float> workspace;
