@@ -88,9 +88,9 @@ Scalar fitted_weight(Scalar fitted, Scalar predicted, Scalar averaged, Scalar sq
   if (!(fitted <= most && predicted <= most && averaged <= most)) return 0;
   constexpr Scalar rounding = 1000 * std::numeric_limits<Scalar>::epsilon();
   if (!(fitted > 0) || !(predicted > 0)) return 1;
-  const Scalar ratio = caution * std::sqrt(fitted) * std::sqrt(predicted) / (averaged + rounding * rounding * squares);
-  const Scalar cubed = ratio * ratio * ratio;
-  return 1 / (1 + cubed * cubed);
+  const Scalar measure = averaged + rounding * rounding * squares;
+  const Scalar squared = (caution * (fitted / measure)) * (caution * (predicted / measure));
+  return 1 / (1 + squared * squared * squared);
 }
 
 /// What a reconstructor gives: one linear table, or two with a data-dependent blend.
