@@ -63,53 +63,33 @@ concept Element = requires(const ReferencePoint<E>& xi) {
   { E::margin(xi) } -> std::convertible_to<double>;
 };
 
-/// An element whose shape functions are polynomials in more than ξ, as rational ones are in their rational term:
-///
-/// num_variables        more than dim
-/// variables(ξ)         num_variables × 1, the first dim of which are ξ
-template <class E>
-concept ElementOfVariables = Element<E> && requires(const ReferencePoint<E>& xi) {
-  { E::num_variables } -> std::convertible_to<int>;
-  { E::variables(xi) } -> std::convertible_to<Eigen::Matrix<double, E::num_variables, 1>>;
-};
-
-namespace detail {
-template <class E>
-constexpr int num_variables() {
-  if constexpr (ElementOfVariables<E>)
-    return E::num_variables;
-  else
-    return E::dim;
-}
-}  // namespace detail
-
-/// The variables of shape functions: ξ, unless the element has more.
-template <class E>
-inline constexpr int num_variables = detail::num_variables<E>();
-template <Element E>
-Eigen::Matrix<double, num_variables<E>, 1> variables(const ReferencePoint<E>& xi) {
-  if constexpr (ElementOfVariables<E>)
-    return E::variables(xi);
-  else
-    return xi;
-}
-
 /// An element that also states its shape functions as polynomials in its variables η, which is what the fast path
-/// evaluates:
+/// evaluates. They are ξ, or for a RationalElement coordinates of its own.
 ///
-/// shape_monomials      std::array of exponents: monomial m is Π_k η_k^shape_monomials[m][k]; the first is 1
-/// shape_coefficients   β_i = Σ_m shape_coefficients[m][i] · monomial m
+/// shape_monomials      std::array of exponents: monomial m is Π_k η_k^shape_monomials[m][k]; the first is 1. What
+///                      products of two have as exponents of η_k, together with given ones of the variables before,
+///                      must be 0 … n
+/// shape_coefficients   β_i = Σ_m shape_coefficients[m][i] · monomial m, of 0 and ± 1
 template <class E>
 concept MonomialElement = Element<E> && requires {
   { E::shape_monomials.size() } -> std::convertible_to<std::size_t>;
-  { E::shape_monomials[0][num_variables<E> - 1] } -> std::convertible_to<int>;
-  { E::shape_coefficients[0][E::num_nodes - 1] } -> std::convertible_to<double>;
+  { E::shape_monomials[0][E::dim - 1] } -> std::convertible_to<int>;
+  { E::shape_coefficients[0][E::num_nodes - 1] } -> std::convertible_to<int>;
+};
+
+/// One whose shape functions are no polynomials in ξ, but in other coordinates of the cell:
+///
+/// variables(ξ)         dim × 1
+/// reference_point(η)   its inverse
+template <class E>
+concept RationalElement = MonomialElement<E> && requires(const ReferencePoint<E>& xi) {
+  { E::variables(xi) } -> std::convertible_to<ReferencePoint<E>>;
+  { E::reference_point(xi) } -> std::convertible_to<ReferencePoint<E>>;
 };
 
 /// One whose shape functions are polynomials in ξ.
 template <class E>
-concept PolynomialElement = MonomialElement<E> && num_variables<E>
-== E::dim;
+concept PolynomialElement = MonomialElement<E> && !RationalElement<E>;
 
 /// An element that also states how its cell is a cube, collapsed where corners share a node: by this the inverse map
 /// proves that no ξ of a cell maps to a position, and elements without it are searched from a lattice of starts.

@@ -25,24 +25,28 @@ struct Pyramid {
       {{4, {0, 3, 2, 1}}, {3, {0, 1, 4}}, {3, {1, 2, 4}}, {3, {2, 3, 4}}, {3, {3, 0, 4}}}};
   static constexpr std::array<int, 8> cube_nodes = {0, 1, 3, 2, 4, 4, 4, 4};
 
-  static constexpr int num_variables = 4;
-  static constexpr std::array<std::array<int, 4>, 5> shape_monomials = {
-      {{0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
-  static constexpr std::array<std::array<double, 5>, 5> shape_coefficients = {
-      {{1, 0, 0, 0, 0}, {-1, 1, 0, 0, 0}, {-1, 0, 0, 1, 0}, {0, -0.5, 0, -0.5, 1}, {1, -1, 1, -1, 0}}};
+  static constexpr std::array<std::array<int, 3>, 5> shape_monomials = {
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {1, 0, 1}, {1, 1, 1}}};
+  static constexpr std::array<std::array<int, 5>, 5> shape_coefficients = {
+      {{0, 0, 0, 0, 1}, {1, 0, 0, 0, -1}, {-1, 1, 0, 0, 0}, {-1, 0, 0, 1, 0}, {1, -1, 1, -1, 0}}};
 
   static Eigen::Matrix<double, 5, 3> nodes() {
     return (Eigen::Matrix<double, 5, 3>() << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0.5, 0.5, 1).finished();
   }
   static Eigen::Vector3d center() { return {0.5, 0.5, 0.25}; }
-  /// ξ and ab/w.
-  static Eigen::Vector4d variables(const Eigen::Vector3d& xi) {
+  /// w, a/w, b/w: the cube that collapses onto the pyramid. All of its side w = 0 is the apex.
+  static Eigen::Vector3d variables(const Eigen::Vector3d& xi) {
     const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2;
-    // Any value of the rational term keeps Σβ = 1 and Σβ_i node_i = ξ; at the apex it is zero.
-    return {xi[0], xi[1], xi[2], w > apex ? a * b / w : 0};
+    return w > 0 ? Eigen::Vector3d(w, a / w, b / w) : Eigen::Vector3d(w, 0, 0);
+  }
+  static Eigen::Vector3d reference_point(const Eigen::Vector3d& eta) {
+    const double top = 1 - eta[0];
+    return {eta[0] * eta[1] + top / 2, eta[0] * eta[2] + top / 2, top};
   }
   static Eigen::Matrix<double, 5, 1> shape(const Eigen::Vector3d& xi) {
-    const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2, rational = variables(xi)[3];
+    const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2;
+    // Any value of the rational term keeps Σβ = 1 and Σβ_i node_i = ξ; at the apex it is zero.
+    const double rational = w > 0 ? a * b / w : 0;
     Eigen::Matrix<double, 5, 1> beta;
     beta << w - a - b + rational, a - rational, rational, b - rational, xi[2];
     return beta;

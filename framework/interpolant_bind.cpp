@@ -191,7 +191,7 @@ template <class Runs, class Scalar>
 void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& order, std::span<const Index> members,
                std::span<const Index> number, std::span<const Index> outside_row, Runs& runs, Index* permutation) {
   using E = typename Runs::element;
-  constexpr int n = E::num_nodes, d = E::dim, num_local = num_variables<E>;
+  constexpr int n = E::num_nodes, d = E::dim;
   const auto num_runs = members.size();
   reserve_large(runs.nodes, num_runs);
   reserve_large(runs.rest, num_runs + 1);
@@ -201,7 +201,7 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
   for (std::size_t r = 0; r < num_runs; ++r)
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
   const auto num_points = static_cast<std::size_t>(runs.first.back());
-  runs.local.assign(num_points * num_local + kernels::vector_padding, Scalar(0));
+  runs.local.assign(num_points * d + kernels::vector_padding, Scalar(0));
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
   if (!outside_row.empty() && !E::affine) runs.offset.assign(num_points, -1);
@@ -232,9 +232,8 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
           xi[k] = embedding.local(*points, k);
           if (E::affine && outside) xi[k] += embedding.outside[outside_row[*points]].offset[k];
         }
-        const auto local = variables<E>(xi);
-        for (int k = 0; k < num_local; ++k)
-          runs.local[static_cast<Offset>(p) * num_local + k] = static_cast<Scalar>(local[k]);
+        if constexpr (RationalElement<E>) xi = E::variables(xi);
+        for (int k = 0; k < d; ++k) runs.local[static_cast<Offset>(p) * d + k] = static_cast<Scalar>(xi[k]);
         if (outside) runs.extrapolates[r] = 1;
       }
     }

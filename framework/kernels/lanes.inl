@@ -23,11 +23,10 @@ using LaneVector = hn::Vec<LaneTag<T>>;
 template <int count, class T>
 HWY_INLINE void load_points(const T* local, LaneVector<T>* eta) {
   const LaneTag<T> tag;
-  static_assert(1 <= count && count <= 4);
+  static_assert(1 <= count && count <= 3);
   if constexpr (count == 1) eta[0] = hn::LoadU(tag, local);
   if constexpr (count == 2) hn::LoadInterleaved2(tag, local, eta[0], eta[1]);
   if constexpr (count == 3) hn::LoadInterleaved3(tag, local, eta[0], eta[1], eta[2]);
-  if constexpr (count == 4) hn::LoadInterleaved4(tag, local, eta[0], eta[1], eta[2], eta[3]);
 }
 
 template <int columns, class T>
@@ -47,17 +46,13 @@ HWY_INLINE void weights(const LaneVector<T>* eta, LaneVector<T>* beta) {
   for (int i = 0; i < n; ++i) beta[i] = hn::Zero(tag);
   unrolled<static_cast<int>(E::shape_monomials.size())>([&](auto m) HALFGRAD_LAMBDA {
     LaneVector<T> monomial = hn::Set(tag, T(1));
-    unrolled<num_variables<E>>([&](auto k) HALFGRAD_LAMBDA {
+    unrolled<E::dim>([&](auto k) HALFGRAD_LAMBDA {
       for (int power = 0; power < E::shape_monomials[m()][k()]; ++power) monomial = hn::Mul(monomial, eta[k()]);
     });
     unrolled<n>([&](auto i) HALFGRAD_LAMBDA {
-      constexpr auto factor = static_cast<T>(E::shape_coefficients[m()][i()]);
-      if constexpr (factor == 1)
-        beta[i()] = hn::Add(beta[i()], monomial);
-      else if constexpr (factor == -1)
-        beta[i()] = hn::Sub(beta[i()], monomial);
-      else if constexpr (factor != 0)
-        beta[i()] = hn::MulAdd(hn::Set(tag, factor), monomial, beta[i()]);
+      constexpr int factor = E::shape_coefficients[m()][i()];
+      if constexpr (factor == 1) beta[i()] = hn::Add(beta[i()], monomial);
+      if constexpr (factor == -1) beta[i()] = hn::Sub(beta[i()], monomial);
     });
   });
 }
@@ -118,8 +113,7 @@ HWY_INLINE void evaluate_rule(const T* const* line, const T* differences, const 
 
 template <class E, Recipe recipe, int columns, class T>
 HWY_NOINLINE void evaluate_lanes(const PointStage<T>& stage, Index begin, Index end) {
-  constexpr int n = E::num_nodes, d = E::dim, num_local = num_variables<E>,
-                lanes = static_cast<int>(hn::MaxLanes(LaneTag<T>()));
+  constexpr int n = E::num_nodes, d = E::dim, lanes = static_cast<int>(hn::MaxLanes(LaneTag<T>()));
   const Index last = stage.first[end];
   for (Index run = begin; run < end; ++run) {
     const T* line[n];
@@ -130,18 +124,18 @@ HWY_NOINLINE void evaluate_lanes(const PointStage<T>& stage, Index begin, Index 
     for (int i = 0; i < n; ++i) (Four<T>::load(line[i]) - first_node).store(differences + 4 * i);
     const T* const rest = stage.rest + static_cast<Offset>(run) * n * d;
     for (Index p = stage.first[run]; p < stage.first[run + 1]; p += lanes) {
-      const T* local = stage.local + static_cast<Offset>(p) * num_local;
+      const T* local = stage.local + static_cast<Offset>(p) * d;
       T* const out = stage.out + static_cast<Offset>(p) * columns;
-      LaneVector<T> eta[num_local], f[columns];
+      LaneVector<T> eta[d], f[columns];
       // Vectors are read and stored whole: the next run overwrites what was stored too much, except at the range's end.
       if (p + lanes <= last) {
-        load_points<num_local>(local, eta);
+        load_points<d>(local, eta);
         evaluate_rule<E, recipe, columns>(line, differences, rest, eta, f);
         store_points<columns>(f, out);
       } else {
-        HWY_ALIGN T some[num_local * lanes] = {}, results[columns * lanes];
-        std::copy_n(local, (last - p) * num_local, some);
-        load_points<num_local>(some, eta);
+        HWY_ALIGN T some[d * lanes] = {}, results[columns * lanes];
+        std::copy_n(local, (last - p) * d, some);
+        load_points<d>(some, eta);
         evaluate_rule<E, recipe, columns>(line, differences, rest, eta, f);
         store_points<columns>(f, results);
         std::copy_n(results, std::min<Index>(stage.first[run + 1] - p, lanes) * columns, out);

@@ -18,13 +18,10 @@ namespace halfgrad::kernels::HWY_NAMESPACE {
 template <class E, int m, int stride, class Item, std::size_t... i>
 HWY_INLINE Item combination(const Item* items, Item sum, std::index_sequence<i...>) {
   const auto add = [&]<std::size_t node>() HALFGRAD_LAMBDA {
-    constexpr auto factor = static_cast<HALFGRAD_SCALAR>(E::shape_coefficients[m][node]);
-    if constexpr (factor == 1)
-      sum = sum + items[node * stride];
-    else if constexpr (factor == -1)
-      sum = sum - items[node * stride];
-    else if constexpr (factor != 0)
-      sum = sum + items[node * stride] * factor;
+    constexpr int factor = E::shape_coefficients[m][node];
+    if constexpr (factor == 1) sum = sum + items[node * stride];
+    if constexpr (factor == -1) sum = sum - items[node * stride];
+    static_assert(factor >= -1 && factor <= 1);
   };
   (add.template operator()<i>(), ...);
   return sum;
@@ -35,7 +32,7 @@ HWY_INLINE Item combination(const Item* items, Item zero) {
 }
 
 template <class E, class T>
-HWY_INLINE void set_up_shape(const Spread<T, num_variables<E>>& spread, const T* const* line, T* coefficients) {
+HWY_INLINE void set_up_shape(const Spread<T, E::dim>& spread, const T* const* line, T* coefficients) {
   using F = Four<T>;
   using M = ProductMonomials<E, Factor::none>;
   F x[E::num_nodes];
@@ -47,8 +44,7 @@ HWY_INLINE void set_up_shape(const Spread<T, num_variables<E>>& spread, const T*
 }
 
 template <class E, Factor factor, class T>
-HWY_INLINE void set_up_blend(const Spread<T, num_variables<E>>& spread, const T* const* line, const T* rest,
-                             T* coefficients) {
+HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* line, const T* rest, T* coefficients) {
   using F = Four<T>;
   using M = ProductMonomials<E, factor>;
   constexpr int n = E::num_nodes, d = E::dim;
@@ -62,14 +58,13 @@ HWY_INLINE void set_up_blend(const Spread<T, num_variables<E>>& spread, const T*
       moved[i] = moved[i].minus(h[a][i], rest[i * d + a]);
     }
   }
-  // Y of the monomial 1 is zero.
   T y[M::num_shape][d];
   F g[M::num_shape][d];
   unrolled<M::num_shape>([&](auto m) HALFGRAD_LAMBDA {
     HALFGRAD_UNROLL
     for (int a = 0; a < d; ++a) {
       g[m()][a] = combination<E, m()>(h[a], F::zero());
-      if constexpr (m() > 0 && M::multiplies(m())) y[m()][a] = combination<E, m(), d>(rest + a, T(0));
+      if constexpr (M::moves(m())) y[m()][a] = combination<E, m(), d>(rest + a, T(0));
     }
   });
   // A coefficient at a time, so that its sum stays in a register.
@@ -88,11 +83,10 @@ HWY_INLINE void set_up_blend(const Spread<T, num_variables<E>>& spread, const T*
 // ---- runs
 
 template <class E, Factor factor, class T>
-HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, const Spread<T, num_variables<E>>& given,
-                                       Index begin, Index end, Index num_whole) {
+HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, const Spread<T, E::dim>& given, Index begin,
+                                       Index end, Index num_whole) {
   using Monomials = ProductMonomials<E, factor>;
-  const Spread<T, num_variables<E>> spread =
-      given;  // a copy, so that stores to the results do not make it be read again
+  const Spread<T, E::dim> spread = given;  // a copy, so that stores to the results do not make it be read again
   constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
   T* target = coefficients;
@@ -107,7 +101,7 @@ HWY_NOINLINE void evaluate_blend_batch(const PointStage<T>& stage, const Spread<
 template <class E, class T>
 void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
   using Monomials = ProductMonomials<E, Factor::none>;
-  const Spread<T, num_variables<E>> spread(stage.num_columns);
+  const Spread<T, E::dim> spread(stage.num_columns);
   constexpr int stride = spread.size * Monomials::size;
   HWY_ALIGN T coefficients[batch_size * stride];
   const Index num_whole = spread.num_whole(stage, end);
@@ -125,7 +119,7 @@ void evaluate_linear(const PointStage<T>& stage, Index begin, Index end) {
 
 template <class E, class T>
 HWY_NOINLINE void evaluate_blend(const PointStage<T>& stage, Index begin, Index end) {
-  const Spread<T, num_variables<E>> spread(stage.num_columns);
+  const Spread<T, E::dim> spread(stage.num_columns);
   const Index num_whole = spread.num_whole(stage, end);
   // Neighbours that are evaluated alike make a batch, so that no cell's result depends on which cells it is among.
   for (Index batch = begin, next; batch < end; batch = next) {
