@@ -35,20 +35,24 @@ template <int D>
 void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
   using Direction = Eigen::Matrix<double, D, 1>;
   using Square = Eigen::Matrix<double, D, D>;
-  // The upper triangle in numbers of its own: as a matrix it would go through memory for every cell.
-  double upper[D][D] = {};
-  for (int a = 0; a < D; ++a) upper[a][a] = epsilon;
-  Direction sum = Direction::Zero();
-  for (const Vector& offset : star.offsets) {
-    star.weights.push_back(1 / offset.template head<D>().norm());
-    const Direction direction = offset.template head<D>() * star.weights.back();
-    for (int a = 0; a < D; ++a)
-      for (int b = a; b < D; ++b) upper[a][b] += direction[a] * direction[b];
-    sum += direction;
+  // Roots and quotients apart, several at a time: they take longer than all else.
+  star.weights.clear();
+  for (const Vector& offset : star.offsets) star.weights.push_back(offset.template head<D>().squaredNorm());
+  Eigen::Map<Eigen::ArrayXd> closenesses(star.weights.data(), static_cast<Eigen::Index>(star.weights.size()));
+  if (!(closenesses > 0).all()) return weigh_by_distance(star);
+  closenesses = closenesses.sqrt().inverse();
+  // As numbers and a full square: parts of Eigen's vectors would go through memory for every cell.
+  double moments[D][D] = {}, sums[D] = {};
+  for (int a = 0; a < D; ++a) moments[a][a] = epsilon;
+  for (std::size_t k = 0; k < star.weights.size(); ++k) {
+    double direction[D];
+    for (int a = 0; a < D; ++a) direction[a] = star.offsets[k][a] * star.weights[k];
+    for (int a = 0; a < D; ++a) {
+      for (int b = 0; b < D; ++b) moments[a][b] += direction[a] * direction[b];
+      sums[a] += direction[a];
+    }
   }
-  Square normal;
-  for (int a = 0; a < D; ++a)
-    for (int b = 0; b < D; ++b) normal(a, b) = upper[std::min(a, b)][std::max(a, b)];
+  const Square normal = Eigen::Map<const Square>(moments[0]);
   // The trace of the inverse is between one and D times that of the least eigenvalue.
   const Square inverse = normal.inverse();
   const double least = 1 / inverse.trace();
@@ -57,7 +61,7 @@ void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
         "chandrashekar_garg: the weights of vertex {} are not determined with epsilon {} (least eigenvalue {:.3g}): "
         "use epsilon > 0",
         vertex, epsilon, symmetric_eigen(normal).values[0]);
-  const Direction lambda = -(inverse * sum);
+  const Direction lambda = -(inverse * Eigen::Map<const Direction>(sums));
   double total = 0, magnitude = 0;
   for (std::size_t k = 0; k < star.weights.size(); ++k) {
     const double closeness = star.weights[k];
@@ -75,7 +79,6 @@ void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
 void weigh_consistently(int gdim, double epsilon, Index vertex, CellStar& star) {
   static_assert(max_gdim == 4);
   if (star.cells.empty()) return;
-  if (std::any_of(star.offsets.begin(), star.offsets.end(), on_vertex)) return weigh_by_distance(star);
   if (gdim == 1) return weigh_consistently<1>(epsilon, vertex, star);
   if (gdim == 2) return weigh_consistently<2>(epsilon, vertex, star);
   if (gdim == 3) return weigh_consistently<3>(epsilon, vertex, star);
