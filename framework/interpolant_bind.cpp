@@ -59,6 +59,13 @@ bool has_affine_map(const NodeMatrix<E>& nodes, double magnitude) {
   return true;
 }
 
+// The block of a cell whose element is known, and its row there.
+template <Element E>
+std::pair<const ElementBlock<E>*, Eigen::Index> place_of(const Mesh& mesh, Index cell) {
+  const std::size_t b = mesh.block_of(cell);
+  return {&std::get<ElementBlock<E>>(mesh.blocks()[b]), cell - mesh.first_cell(b)};
+}
+
 // Fills the runs of one element type from the cells `members` (places in order.cells); sizes are exact.
 template <class Runs, class Scalar>
 void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder& order, std::span<const Index> members,
@@ -66,10 +73,9 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder&
   using E = typename Runs::element;
   constexpr int n = E::num_nodes, d = E::dim;
   const auto num_runs = members.size();
-  reserve_large(runs.nodes, num_runs);
-  reserve_large(runs.rest, num_runs + 1);
-  runs.nodes.resize(num_runs);
-  runs.rest.resize(num_runs + 1);
+  runs.nodes = LargeArray<std::array<Index, n>>(num_runs);
+  runs.rest = LargeArray<std::array<std::array<Scalar, d>, n>>(num_runs + 1);
+  runs.rest[num_runs] = {};
   runs.first.resize(num_runs + 1);
   for (std::size_t r = 0; r < num_runs; ++r)
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
@@ -81,13 +87,10 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder&
   const Index* last_point = order.points.data() + order.points.size() - 1;
   parallel_for(static_cast<std::int64_t>(num_runs), 4096, [&](std::int64_t begin, std::int64_t end) {
     for (auto r = static_cast<Index>(begin); r < end; ++r) {
-      const Index cell = order.cells[members[r]];
-      const std::size_t b = mesh.block_of(cell);
-      const auto positions =
-          node_positions(mesh, std::get<ElementBlock<E>>(mesh.blocks()[b]), cell - mesh.first_cell(b));
-      const std::span<const Index> vertices = mesh.cell_vertices(cell);
+      const auto [block, row] = place_of<E>(mesh, order.cells[members[r]]);
+      const auto positions = node_positions(mesh, *block, row);
       for (int i = 0; i < n; ++i) {
-        runs.nodes[r][i] = number[vertices[i]];
+        runs.nodes[r][i] = number[block->cells(row, i)];
         for (int k = 0; k < d; ++k) runs.rest[r][i][k] = static_cast<Scalar>(positions(i, k) - positions(0, k));
       }
       if constexpr (PolynomialElement<E> && !E::affine)
@@ -119,10 +122,9 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder&
 }
 
 // Rows of the first `num_active` of `vertices`; the vertices that only the rows read are appended to `vertices`.
-template <class Stencils>
+template <class Scalar, class Stencils>
 void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index num_active,
                    std::vector<Index>& vertices, std::vector<Index>& number, Stencils& stencils) {
-  using Scalar = typename decltype(stencils.weights)::value_type;
   std::vector<Index> row_of(number.size(), -1);
   for (Index r = 0; r < table.num_rows(); ++r) row_of[table.vertices[r]] = r;
   const int d = table.gdim, sym = with_hessians ? num_symmetric(d) : 0, width = d + sym;
@@ -134,10 +136,8 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
     stencils.first_group[v + 1] = stencils.first_group[v] + (table.offsets[r + 1] - table.offsets[r] + 3) / 4;
   }
   const auto num_entries = static_cast<std::size_t>(4 * stencils.first_group.back());
-  reserve_large(stencils.neighbors, num_entries);
-  reserve_large(stencils.weights, num_entries * static_cast<std::size_t>(width));
-  stencils.neighbors.resize(num_entries);
-  stencils.weights.assign(stencils.neighbors.size() * static_cast<std::size_t>(width), Scalar(0));
+  stencils.neighbors = LargeArray<Index>(num_entries);
+  stencils.weights = LargeArray<Scalar>(num_entries * static_cast<std::size_t>(width));
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
     Offset to = stencils.begin(v);
@@ -153,7 +153,10 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
       for (int k = 0; k < sym; ++k)
         stencils.weights[stencils.place(to, d + k)] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
     }
-    std::fill(stencils.neighbors.begin() + to, stencils.neighbors.begin() + stencils.end(v), v);
+    for (; to < stencils.end(v); ++to) {
+      stencils.neighbors[to] = v;
+      for (int k = 0; k < width; ++k) stencils.weights[stencils.place(to, k)] = 0;
+    }
   }
 }
 
@@ -172,7 +175,7 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
     blended = select_rows(*reconstruction, vertices);
     take_blend(number);
   } else {
-    pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
+    pack_stencils<Scalar>(table, rule.needs_hessians(), num_active, vertices, number, stencils);
   }
   vertices.shrink_to_fit();
   report.num_stencil_entries += table.num_entries();
@@ -188,8 +191,8 @@ void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
     number[rows.vertices[r]] = static_cast<Index>(vertices.size());
     vertices.push_back(rows.vertices[r]);
   }
-  pack_stencils(rows, false, rows.num_rows(), vertices, number, stencils);
-  pack_stencils(given.averaging, false, num_active, vertices, number, blend.averaging);
+  pack_stencils<Scalar>(rows, false, rows.num_rows(), vertices, number, stencils);
+  pack_stencils<Scalar>(given.averaging, false, num_active, vertices, number, blend.averaging);
   report.num_stencil_entries += given.beyond.num_entries() + given.averaging.num_entries();
   for (Index r = 0; r < num_active; ++r) {
     const std::vector<WeightedEdge> edges = weighted_edges(given, r, gdim);
@@ -207,7 +210,12 @@ void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
 
 template <class Scalar>
 void Interpolant<Scalar>::Binding::count_bytes() {
-  const auto bytes = [](const auto& vector) { return static_cast<Offset>(vector.capacity() * sizeof(vector[0])); };
+  const auto bytes = [](const auto& array) {
+    if constexpr (requires { array.capacity(); })
+      return static_cast<Offset>(array.capacity() * sizeof(array[0]));
+    else
+      return static_cast<Offset>(array.size() * sizeof(array[0]));
+  };
   for (const auto& any : blocks)
     std::visit(
         [&](const auto& runs) {
@@ -288,10 +296,9 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
                             binding->permutation.data() + base);
     if constexpr (E::affine)
       if (rule.needs_gradients() && !rule.needs_hessians())
-        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run, int i, int j) -> ReferencePoint<E> {
-          const std::span<const Index> vertices = mesh.cell_vertices(order.cells[members[run]]);
-          const auto position = [&](int node) { return mesh.vertices().row(vertices[node]).template head<E::dim>(); };
-          return (position(j) - position(i)).transpose();
+        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run) {
+          const auto [block, row] = place_of<E>(mesh, order.cells[members[run]]);
+          return node_positions(mesh, *block, row);
         });
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));
