@@ -23,10 +23,10 @@ struct EdgeWindows {
   }
 };
 
-/// `nodes` are the vertices of each run; `positions(run)` are theirs in double: differences of positions in float would
-/// keep no digits of a short edge.
-template <int dim, class Scalar, class Nodes, class Positions>
-EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Positions& positions) {
+/// `nodes` are the vertices of each run; `position(node)` is in double: differences of positions in float would keep no
+/// digits of a short edge.
+template <int dim, class Scalar, class Nodes, class Position>
+EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Position& position) {
   constexpr int num_pairs = kernels::num_edges(dim);
   // Open addressing; a slot of an earlier window counts as empty. Twice the edges that a window can have, or more.
   struct Slot {
@@ -46,7 +46,8 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Positions& positions)
   for (Index run = 0; run < num_runs; ++run) {
     if (run % kernels::window_size == 0) result.first.push_back(num_edges);
     const Index window_begin = result.first.back();
-    const auto at = positions(run);
+    Eigen::Matrix<double, dim, dim + 1> positions;
+    for (int i = 0; i <= dim; ++i) positions.col(i) = position(nodes[run][i]);
     unsigned reversed = 0;
     int pair = 0;
     for (int i = 0; i < dim; ++i)
@@ -64,7 +65,8 @@ EdgeWindows<Scalar> edge_windows(const Nodes& nodes, const Positions& positions)
         slot = {low, high, edge};
         result.ends[num_edges] = {from, to};
         for (int k = 0; k < dim; ++k)
-          result.vectors[static_cast<std::size_t>(num_edges) * dim + k] = static_cast<Scalar>(at(j, k) - at(i, k));
+          result.vectors[static_cast<std::size_t>(num_edges) * dim + k] =
+              static_cast<Scalar>(positions(k, j) - positions(k, i));
         num_edges += is_new;
         result.of_run[static_cast<std::size_t>(run) * num_pairs + pair] =
             static_cast<std::uint16_t>(edge - window_begin);

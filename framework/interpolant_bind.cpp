@@ -59,13 +59,6 @@ bool has_affine_map(const NodeMatrix<E>& nodes, double magnitude) {
   return true;
 }
 
-// The block of a cell whose element is known, and its row there.
-template <Element E>
-std::pair<const ElementBlock<E>*, Eigen::Index> place_of(const Mesh& mesh, Index cell) {
-  const std::size_t b = mesh.block_of(cell);
-  return {&std::get<ElementBlock<E>>(mesh.blocks()[b]), cell - mesh.first_cell(b)};
-}
-
 // Fills the runs of one element type from the cells `members` (places in order.cells); sizes are exact.
 template <class Runs, class Scalar>
 void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder& order, std::span<const Index> members,
@@ -84,13 +77,21 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder&
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
   if (!outside_row.empty() && !E::affine) runs.offset.assign(num_points, -1);
+  const auto nodes_of = [&](Index run) {
+    const Index cell = order.cells[members[run]];
+    const std::size_t b = mesh.block_of(cell);
+    return std::get<ElementBlock<E>>(mesh.blocks()[b]).cells.data() + (cell - mesh.first_cell(b)) * Offset{n};
+  };
   const Index* last_point = order.points.data() + order.points.size() - 1;
   parallel_for(static_cast<std::int64_t>(num_runs), 4096, [&](std::int64_t begin, std::int64_t end) {
     for (auto r = static_cast<Index>(begin); r < end; ++r) {
-      const auto [block, row] = place_of<E>(mesh, order.cells[members[r]]);
-      const auto positions = node_positions(mesh, *block, row);
+      // Cells and points lie anywhere in the caller's order: each would miss the cache.
+      __builtin_prefetch(nodes_of(std::min(r + 16, static_cast<Index>(num_runs) - 1)));
+      const Index* nodes = nodes_of(r);
+      NodeMatrix<E> positions;
       for (int i = 0; i < n; ++i) {
-        runs.nodes[r][i] = number[block->cells(row, i)];
+        positions.row(i) = mesh.vertices().row(nodes[i]).template head<d>();
+        runs.nodes[r][i] = number[nodes[i]];
         for (int k = 0; k < d; ++k) runs.rest[r][i][k] = static_cast<Scalar>(positions(i, k) - positions(0, k));
       }
       if constexpr (PolynomialElement<E> && !E::affine)
@@ -98,7 +99,6 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder&
             has_affine_map<Scalar, E>(positions.rowwise() - positions.row(0), positions.cwiseAbs().maxCoeff());
       const Index* points = order.points.data() + order.first_point[members[r]];
       for (Index p = runs.first[r]; p < runs.first[r + 1]; ++p, ++points) {
-        // Points lie anywhere in the caller's order: each would miss the cache.
         __builtin_prefetch(embedding.local.data() + points[std::min<std::ptrdiff_t>(24, last_point - points)] * d);
         permutation[p] = *points;
         // On a simplex a point outside differs from one inside by its ξ alone; elsewhere it keeps its offset apart.
@@ -296,9 +296,8 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
                             binding->permutation.data() + base);
     if constexpr (E::affine)
       if (rule.needs_gradients() && !rule.needs_hessians())
-        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run) {
-          const auto [block, row] = place_of<E>(mesh, order.cells[members[run]]);
-          return node_positions(mesh, *block, row);
+        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index node) {
+          return mesh.vertices().row(order.vertices[node]).template head<E::dim>().transpose();
         });
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));
