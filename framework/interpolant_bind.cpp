@@ -1,4 +1,4 @@
-// Bind: points sorted by cell, vertices by first use, stencils in that numbering.
+// Bind: runs of points, the edges of their cells and the stencils of vertices, in the order of a binding.
 #include <numeric>
 
 #include "framework/binding_order.hpp"
