@@ -42,19 +42,19 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
   EmbedOptions nearest;
   nearest.outside = Outside::nearest;
   struct {
-    double embed, active, incidence, reconstruct, pack;
+    double embed, order, incidence, reconstruct, pack;
   } parts{};
   const auto bind = [&] {
     Stopwatch watch;
     const Embedding embedding = embed(mesh, workload.points, nearest);
     parts.embed = watch.lap();
-    const std::vector<Index> active = active_vertices(mesh, embedding);
-    parts.active = watch.lap();
+    const BindingOrder order = binding_order(mesh, embedding);
+    parts.order = watch.lap();
     const CellGradients cells(mesh);
     parts.incidence = watch.lap();
-    const Reconstruction stencils = ChandrashekarGarg().reconstruct(cells, active);
+    const Reconstruction stencils = ChandrashekarGarg().reconstruct(cells, order.vertices);
     parts.reconstruct = watch.lap();
-    Interpolant<float> interpolant(mesh, embedding, named_rule("phong"), &stencils);
+    Interpolant<float> interpolant(mesh, embedding, order, named_rule("phong"), &stencils);
     parts.pack = watch.lap();
     return interpolant;
   };
@@ -89,7 +89,7 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
     const std::pair<const char*, double> operations[] = {{"locate", located},
                                                          {"bind", bound},
                                                          {"bind.embed", parts.embed},
-                                                         {"bind.active_vertices", parts.active},
+                                                         {"bind.order", parts.order},
                                                          {"bind.incidence", parts.incidence},
                                                          {"bind.reconstruct", parts.reconstruct},
                                                          {"bind.pack", parts.pack},

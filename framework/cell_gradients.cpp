@@ -10,6 +10,9 @@ CellGradients::CellGradients(const Mesh& mesh)
     : vertices_(&mesh.vertices()), mesh_(&mesh), vertex_cells_(vertex_cells(mesh)) {
   if (mesh.is_surface())
     raise("cell gradients of a surface in space: use surface_gradients, which fits tangent planes");
+  for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
+    blocks_.push_back({first, first + static_cast<Index>(block.cells.rows()), E::num_nodes, block.cells.data()});
+  });
 }
 
 CellGradients::CellGradients(const CellTable& table)

@@ -62,7 +62,10 @@ class CellGradients {
   const Points& vertices() const { return *vertices_; }
   std::span<const Index> cells_of(Index vertex) const { return vertex_cells_[vertex]; }
   std::span<const Index> vertices_of(Index cell) const {
-    return table_ != nullptr ? table_->cells[cell] : mesh_->cell_vertices(cell);
+    if (table_ != nullptr) return table_->cells[cell];
+    const BlockNodes* block = blocks_.data();
+    while (cell >= block->end) ++block;
+    return {block->nodes + static_cast<Offset>(cell - block->first) * block->num_nodes, block->num_nodes};
   }
   /// Whether a vertex lies on a facet that belongs to one cell only, or to more than two.
   bool on_boundary(Index vertex) const;
@@ -72,9 +75,17 @@ class CellGradients {
   Vector centroid(Index cell) const;
 
  private:
+  // The cells first … end − 1, without their element: its type costs a call to find, for every cell at every vertex.
+  struct BlockNodes {
+    Index first, end;
+    std::size_t num_nodes;
+    const Index* nodes;
+  };
+
   const Points* vertices_;
   const Mesh* mesh_ = nullptr;
   const CellTable* table_ = nullptr;
+  std::vector<BlockNodes> blocks_;  // of a mesh
   IndexTable vertex_cells_;
 };
 

@@ -234,8 +234,8 @@ class SlabPoints {
     }
   }
   void forget_positions() {
-    for (auto& axis : x) axis.reset();
-    margin.reset();
+    for (auto& axis : x) axis = {};
+    margin = {};
   }
 
   std::array<LargeArray<double>, D> x;  // sorted coordinates, and max_lanes unused
@@ -261,11 +261,11 @@ class SlabPoints {
 
 template <int D>
 SlabPoints<D>::SlabPoints(const Points& points, const Boxes<D>& boxes, const Slab& slab)
-    : xi(large_array<Coordinates<D>>(slab.num_points)),
+    : xi(slab.num_points),
       boxes_(boxes),
       slab_(slab),
       num_listed_(slab.is_whole() ? static_cast<Index>(points.rows()) : slab.num_points),
-      place_(large_array<Index>(num_listed_)) {
+      place_(num_listed_) {
   const std::int64_t num_boxes = (slab.last_slice + 1 - slab.first_slice) * boxes.boxes_a_slice();
   first_.assign(static_cast<std::size_t>(num_boxes) + 1, 0);
   // A point's box and position; the place of ξ is free for it yet.
@@ -284,8 +284,8 @@ SlabPoints<D>::SlabPoints(const Points& points, const Boxes<D>& boxes, const Sla
   std::partial_sum(first_.begin(), first_.end(), first_.begin());
   // Rows are tested several points at a time and read beyond their ends.
   for (auto& axis : x) {
-    axis = large_array<double>(count + max_lanes);
-    std::fill_n(axis.get() + count, max_lanes, 0.0);
+    axis = LargeArray<double>(count + max_lanes);
+    std::fill_n(axis.data() + count, max_lanes, 0.0);
   }
   for (Index i = 0, kept = 0; i < num_listed_; ++i) {
     if (place_[i] < 0) continue;
@@ -296,10 +296,10 @@ SlabPoints<D>::SlabPoints(const Points& points, const Boxes<D>& boxes, const Sla
   // The insertion advanced every box to the start of the next one.
   std::move_backward(first_.begin(), first_.end() - 1, first_.end());
   first_[0] = 0;
-  margin = large_array<double>(count + max_lanes);
-  std::fill_n(margin.get(), count + max_lanes, -infinity);
-  cell = large_array<Index>(count);
-  std::fill_n(cell.get(), count, -1);
+  margin = LargeArray<double>(count + max_lanes);
+  std::fill_n(margin.data(), count + max_lanes, -infinity);
+  cell = LargeArray<Index>(count);
+  std::fill_n(cell.data(), count, -1);
 }
 
 // The planes of an affine cell.
@@ -365,8 +365,8 @@ void claim(const Mesh& mesh, const ElementBlock<E>& block, Eigen::Index row, Ind
     const AffineCell<E> affine(node_positions(mesh, block, row), tolerance);
     if (affine.map.degenerate()) return;
     if (static_cast<Index>(buffers.claimed.size()) < num_points) buffers.claimed.resize(num_points);
-    PlaneTest<E::dim> test{affine.planes, affine.least, {}, points.margin.get()};
-    for (int a = 0; a < E::dim; ++a) test.x[a] = points.x[a].get();
+    PlaneTest<E::dim> test{affine.planes, affine.least, {}, points.margin.data()};
+    for (int a = 0; a < E::dim; ++a) test.x[a] = points.x[a].data();
     const Index num_claimed = raise_margins(test, buffers.rows, buffers.claimed.data());
     for (Index i = 0; i < num_claimed; ++i) {
       const Index p = buffers.claimed[i];
@@ -405,7 +405,7 @@ std::vector<Slab> make_slabs(const Points& points, const Boxes<D>& boxes, Index 
   const Index num_wanted = std::max(num_threads() == 1 ? 1 : 4 * num_threads(), (num_points - 1) / max_slab_points + 1);
   if (num_wanted == 1 || num_slices == 1) return {{0, num_slices - 1, nullptr, num_points, {}}};
   const auto all = static_cast<Index>(points.rows());
-  const LargeArray<int> slice_of = large_array<int>(all);
+  LargeArray<int> slice_of(all);
   std::vector<Index> count(num_slices, 0);
   for (Index p = 0; p < all; ++p) {
     const Coordinates<D> position = points.row(p).template head<D>().transpose();
@@ -416,11 +416,11 @@ std::vector<Slab> make_slabs(const Points& points, const Boxes<D>& boxes, Index 
   std::vector<std::size_t> slab_of(num_slices);
   std::vector<Index> next;  // of each slab: where its next point goes
   Index before = 0;
-  members = large_array<Index>(num_points);
+  members = LargeArray<Index>(num_points);
   for (int slice = 0; slice < num_slices; ++slice) {
     const auto share = static_cast<std::int64_t>(slabs.size()) * num_points / num_wanted;
     if (slabs.empty() || (before >= share && before < num_points)) {
-      slabs.push_back({slice, slice, members.get() + before, 0, {}});
+      slabs.push_back({slice, slice, members.data() + before, 0, {}});
       next.push_back(before);
     }
     slabs.back().last_slice = slice;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "framework/binding_order.hpp"
 #include "framework/embedding.hpp"
 #include "framework/gradient_stencils.hpp"
 #include "framework/interpolation_rule.hpp"
@@ -53,12 +54,6 @@ struct Workspace {
   double held_tolerance = 0;
 };
 
-/// The vertices of the cells that hold points, in the order in which an interpolant numbers them: by first use along
-/// the cells sorted in space.
-std::vector<Index> active_vertices(const Mesh& mesh, const Embedding& embedding);
-
-/// The same on a grid, by the grid's numbers.
-std::vector<Index> active_vertices(const Grid& grid, const Embedding& embedding);
 /// The vertices that points have weights on, by first use.
 std::vector<Index> active_vertices(const WeightedPoints& points);
 
@@ -69,6 +64,9 @@ class Interpolant {
   /// `reconstruction` has a row for every active vertex, or is null for rules that need none and for interpolants whose
   /// gradients the caller supplies. Throws Error where the rule lacks what it needs.
   Interpolant(const Mesh& mesh, const Embedding& embedding, const InterpolationRule& rule,
+              const Reconstruction* reconstruction);
+  /// The same where the order is at hand: that of this mesh and embedding.
+  Interpolant(const Mesh& mesh, const Embedding& embedding, const BindingOrder& order, const InterpolationRule& rule,
               const Reconstruction* reconstruction);
   /// The same on a grid: an explicit mesh of the cells that hold points and no others is made meanwhile.
   Interpolant(const Grid& grid, const Embedding& embedding, const InterpolationRule& rule,
@@ -132,7 +130,7 @@ class Interpolant {
  private:
   struct Binding;
   // A mesh that is part of a larger one: `numbers` are its vertices' there.
-  Interpolant(const Mesh& mesh, const Embedding& embedding, const InterpolationRule& rule,
+  Interpolant(const Mesh& mesh, const Embedding& embedding, const BindingOrder& order, const InterpolationRule& rule,
               const Reconstruction* reconstruction, std::span<const Index> numbers, Index num_vertices,
               Index num_cells);
   std::unique_ptr<const Binding> binding_;

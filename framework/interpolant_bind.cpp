@@ -1,139 +1,12 @@
-// Bind: points sorted by cell, cells along a curve, vertices by first use, stencils in that numbering.
+// Bind: runs of points, the edges of their cells and the stencils of vertices, in the order of a binding.
 #include <numeric>
 
+#include "framework/binding_order.hpp"
 #include "framework/grid.hpp"
 #include "framework/interpolant_binding.hpp"
 #include "framework/large_array.hpp"
 
 namespace halfgrad {
-
-namespace {
-
-// Interleaves the bits of quantised coordinates, 32 in all: cells near in space get near numbers.
-class MortonCode {
- public:
-  explicit MortonCode(const Points& vertices) : gdim_(static_cast<int>(vertices.cols())) {
-    const Eigen::RowVectorXd low = vertices.colwise().minCoeff(), high = vertices.colwise().maxCoeff();
-    const double extent = (high - low).maxCoeff();
-    low_.assign(low.begin(), low.end());
-    const double steps = static_cast<double>((std::int64_t{1} << 32 / gdim_) - 1);
-    scale_ = extent > 0 ? steps / extent : 0;
-    for (std::uint32_t byte = 0; byte < 256; ++byte)
-      for (int b = 0; b < 8; ++b) spread_[byte] |= static_cast<std::uint64_t>(byte >> b & 1) << b * gdim_;
-  }
-
-  std::uint32_t operator()(const double* position) const {
-    std::uint64_t code = 0;
-    for (int k = 0; k < gdim_; ++k) {
-      const auto step = static_cast<std::uint32_t>((position[k] - low_[k]) * scale_);
-      for (int byte = 0; 8 * byte < 32 / gdim_; ++byte)
-        code |= spread_[step >> 8 * byte & 255] << (8 * byte * gdim_ + gdim_ - 1 - k);
-    }
-    return static_cast<std::uint32_t>(code);
-  }
-
- private:
-  int gdim_;
-  std::vector<double> low_;
-  double scale_;
-  std::array<std::uint64_t, 256> spread_{};
-};
-
-struct CodedCell {
-  std::uint32_t code;
-  Index cell;
-};
-
-// Sorts by code; cells of one code keep their order.
-void sort_by_code(std::vector<CodedCell>& cells) {
-  constexpr int bits = 11, mask = (1 << bits) - 1;
-  std::vector<CodedCell> sorted;
-  reserve_large(sorted, cells.size());
-  sorted.resize(cells.size());
-  for (int shift = 0; shift < 32; shift += bits) {
-    std::array<Index, mask + 2> next{};
-    for (const CodedCell& cell : cells) ++next[(cell.code >> shift & mask) + 1];
-    std::partial_sum(next.begin(), next.end(), next.begin());
-    for (const CodedCell& cell : cells) sorted[next[cell.code >> shift & mask]++] = cell;
-    cells.swap(sorted);
-  }
-}
-
-// How many points each cell holds.
-std::vector<Index> points_a_cell(const Mesh& mesh, const Embedding& embedding) {
-  std::vector<Index> count(static_cast<std::size_t>(mesh.num_cells()), 0);
-  for (Index cell : embedding.cells)
-    if (cell >= 0) ++count[cell];
-  return count;
-}
-
-// The cells that hold points, sorted along a space-filling curve.
-std::vector<Index> cells_along_curve(const Mesh& mesh, std::span<const Index> count) {
-  std::vector<CodedCell> coded;
-  reserve_large(coded, count.size() - static_cast<std::size_t>(std::ranges::count(count, 0)));
-  if (mesh.num_cells() > 0) {
-    const MortonCode code(mesh.vertices());
-    for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index first) {
-      for (Eigen::Index c = 0; c < block.cells.rows(); ++c)
-        if (const auto cell = static_cast<Index>(first + c); count[cell] > 0)
-          coded.push_back({code(mesh.vertices().data() + block.cells(c, 0) * mesh.vertices().cols()), cell});
-    });
-  }
-  sort_by_code(coded);
-  std::vector<Index> cells;
-  cells.reserve(coded.size());
-  for (const CodedCell& each : coded) cells.push_back(each.cell);
-  return cells;
-}
-
-// Those cells and the points of each in ascending order.
-struct CellOrder {
-  std::vector<Index> cells;
-  std::vector<Index> first_point;  // #cells + 1, into points
-  std::vector<Index> points;
-};
-
-CellOrder order_cells(const Mesh& mesh, const Embedding& embedding) {
-  std::vector<Index> count = points_a_cell(mesh, embedding);
-  CellOrder order;
-  order.cells = cells_along_curve(mesh, count);
-  order.first_point.reserve(order.cells.size() + 1);
-  order.first_point.push_back(0);
-  for (const Index cell : order.cells) {
-    const Index begin = order.first_point.back();
-    order.first_point.push_back(begin + count[cell]);
-    count[cell] = begin;  // now where the cell's next point goes
-  }
-  order.points.resize(static_cast<std::size_t>(order.first_point.back()));
-  for (Index p = 0; p < embedding.num_points(); ++p)
-    if (embedding.cells[p] >= 0) order.points[count[embedding.cells[p]]++] = p;
-  return order;
-}
-
-std::vector<Index> vertices_by_first_use(const Mesh& mesh, std::span<const Index> cells) {
-  std::vector<char> seen(static_cast<std::size_t>(mesh.num_vertices()), 0);
-  std::vector<Index> active;
-  for (Index cell : cells)
-    for (Index v : mesh.cell_vertices(cell))
-      if (!seen[v]) {
-        seen[v] = 1;
-        active.push_back(v);
-      }
-  return active;
-}
-
-}  // namespace
-
-std::vector<Index> active_vertices(const Mesh& mesh, const Embedding& embedding) {
-  return vertices_by_first_use(mesh, cells_along_curve(mesh, points_a_cell(mesh, embedding)));
-}
-
-std::vector<Index> active_vertices(const Grid& grid, const Embedding& embedding) {
-  const GridPart part = active_part(grid, embedding);
-  std::vector<Index> active = active_vertices(part.mesh, part.embedding);
-  for (Index& vertex : active) vertex = part.vertices[vertex];
-  return active;
-}
 
 namespace {
 
@@ -188,15 +61,14 @@ bool has_affine_map(const NodeMatrix<E>& nodes, double magnitude) {
 
 // Fills the runs of one element type from the cells `members` (places in order.cells); sizes are exact.
 template <class Runs, class Scalar>
-void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& order, std::span<const Index> members,
+void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder& order, std::span<const Index> members,
                std::span<const Index> number, std::span<const Index> outside_row, Runs& runs, Index* permutation) {
   using E = typename Runs::element;
   constexpr int n = E::num_nodes, d = E::dim;
   const auto num_runs = members.size();
-  reserve_large(runs.nodes, num_runs);
-  reserve_large(runs.rest, num_runs + 1);
-  runs.nodes.resize(num_runs);
-  runs.rest.resize(num_runs + 1);
+  runs.nodes = LargeArray<std::array<Index, n>>(num_runs);
+  runs.rest = LargeArray<std::array<std::array<Scalar, d>, n>>(num_runs + 1);
+  runs.rest[num_runs] = {};
   runs.first.resize(num_runs + 1);
   for (std::size_t r = 0; r < num_runs; ++r)
     runs.first[r + 1] = runs.first[r] + order.first_point[members[r] + 1] - order.first_point[members[r]];
@@ -205,16 +77,21 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
   if constexpr (PolynomialElement<E> && !E::affine) runs.affine.resize(num_runs);
   if (!outside_row.empty()) runs.extrapolates.assign(num_runs, 0);
   if (!outside_row.empty() && !E::affine) runs.offset.assign(num_points, -1);
+  const auto nodes_of = [&](Index run) {
+    const Index cell = order.cells[members[run]];
+    const std::size_t b = mesh.block_of(cell);
+    return std::get<ElementBlock<E>>(mesh.blocks()[b]).cells.data() + (cell - mesh.first_cell(b)) * Offset{n};
+  };
   const Index* last_point = order.points.data() + order.points.size() - 1;
   parallel_for(static_cast<std::int64_t>(num_runs), 4096, [&](std::int64_t begin, std::int64_t end) {
     for (auto r = static_cast<Index>(begin); r < end; ++r) {
-      const Index cell = order.cells[members[r]];
-      const std::size_t b = mesh.block_of(cell);
-      const auto positions =
-          node_positions(mesh, std::get<ElementBlock<E>>(mesh.blocks()[b]), cell - mesh.first_cell(b));
-      const std::span<const Index> vertices = mesh.cell_vertices(cell);
+      // Cells and points lie anywhere in the caller's order: each would miss the cache.
+      __builtin_prefetch(nodes_of(std::min(r + 16, static_cast<Index>(num_runs) - 1)));
+      const Index* nodes = nodes_of(r);
+      NodeMatrix<E> positions;
       for (int i = 0; i < n; ++i) {
-        runs.nodes[r][i] = number[vertices[i]];
+        positions.row(i) = mesh.vertices().row(nodes[i]).template head<d>();
+        runs.nodes[r][i] = number[nodes[i]];
         for (int k = 0; k < d; ++k) runs.rest[r][i][k] = static_cast<Scalar>(positions(i, k) - positions(0, k));
       }
       if constexpr (PolynomialElement<E> && !E::affine)
@@ -222,7 +99,6 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
             has_affine_map<Scalar, E>(positions.rowwise() - positions.row(0), positions.cwiseAbs().maxCoeff());
       const Index* points = order.points.data() + order.first_point[members[r]];
       for (Index p = runs.first[r]; p < runs.first[r + 1]; ++p, ++points) {
-        // Points lie anywhere in the caller's order: each would miss the cache.
         __builtin_prefetch(embedding.local.data() + points[std::min<std::ptrdiff_t>(24, last_point - points)] * d);
         permutation[p] = *points;
         // On a simplex a point outside differs from one inside by its ξ alone; elsewhere it keeps its offset apart.
@@ -248,10 +124,9 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const CellOrder& or
 }
 
 // Rows of the first `num_active` of `vertices`; the vertices that only the rows read are appended to `vertices`.
-template <class Stencils>
+template <class Scalar, class Stencils>
 void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index num_active,
                    std::vector<Index>& vertices, std::vector<Index>& number, Stencils& stencils) {
-  using Scalar = typename decltype(stencils.weights)::value_type;
   std::vector<Index> row_of(number.size(), -1);
   for (Index r = 0; r < table.num_rows(); ++r) row_of[table.vertices[r]] = r;
   const int d = table.gdim, sym = with_hessians ? num_symmetric(d) : 0, width = d + sym;
@@ -263,10 +138,8 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
     stencils.first_group[v + 1] = stencils.first_group[v] + (table.offsets[r + 1] - table.offsets[r] + 3) / 4;
   }
   const auto num_entries = static_cast<std::size_t>(4 * stencils.first_group.back());
-  reserve_large(stencils.neighbors, num_entries);
-  reserve_large(stencils.weights, num_entries * static_cast<std::size_t>(width));
-  stencils.neighbors.resize(num_entries);
-  stencils.weights.assign(stencils.neighbors.size() * static_cast<std::size_t>(width), Scalar(0));
+  stencils.neighbors = LargeArray<Index>(num_entries);
+  stencils.weights = LargeArray<Scalar>(num_entries * static_cast<std::size_t>(width));
   for (Index v = 0; v < num_active; ++v) {
     const Index r = row_of[vertices[v]];
     Offset to = stencils.begin(v);
@@ -282,7 +155,10 @@ void pack_stencils(const GradientStencilTable& table, bool with_hessians, Index 
       for (int k = 0; k < sym; ++k)
         stencils.weights[stencils.place(to, d + k)] = static_cast<Scalar>(table.hessian_weights[e * sym + k]);
     }
-    std::fill(stencils.neighbors.begin() + to, stencils.neighbors.begin() + stencils.end(v), v);
+    for (; to < stencils.end(v); ++to) {
+      stencils.neighbors[to] = v;
+      for (int k = 0; k < width; ++k) stencils.weights[stencils.place(to, k)] = 0;
+    }
   }
 }
 
@@ -301,7 +177,7 @@ void Interpolant<Scalar>::Binding::take_gradients(const Reconstruction* reconstr
     blended = select_rows(*reconstruction, vertices);
     take_blend(number);
   } else {
-    pack_stencils(table, rule.needs_hessians(), num_active, vertices, number, stencils);
+    pack_stencils<Scalar>(table, rule.needs_hessians(), num_active, vertices, number, stencils);
   }
   vertices.shrink_to_fit();
   report.num_stencil_entries += table.num_entries();
@@ -317,8 +193,8 @@ void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
     number[rows.vertices[r]] = static_cast<Index>(vertices.size());
     vertices.push_back(rows.vertices[r]);
   }
-  pack_stencils(rows, false, rows.num_rows(), vertices, number, stencils);
-  pack_stencils(given.averaging, false, num_active, vertices, number, blend.averaging);
+  pack_stencils<Scalar>(rows, false, rows.num_rows(), vertices, number, stencils);
+  pack_stencils<Scalar>(given.averaging, false, num_active, vertices, number, blend.averaging);
   report.num_stencil_entries += given.beyond.num_entries() + given.averaging.num_entries();
   for (Index r = 0; r < num_active; ++r) {
     const std::vector<WeightedEdge> edges = weighted_edges(given, r, gdim);
@@ -336,7 +212,12 @@ void Interpolant<Scalar>::Binding::take_blend(std::vector<Index>& number) {
 
 template <class Scalar>
 void Interpolant<Scalar>::Binding::count_bytes() {
-  const auto bytes = [](const auto& vector) { return static_cast<Offset>(vector.capacity() * sizeof(vector[0])); };
+  const auto bytes = [](const auto& array) {
+    if constexpr (requires { array.capacity(); })
+      return static_cast<Offset>(array.capacity() * sizeof(array[0]));
+    else
+      return static_cast<Offset>(array.size() * sizeof(array[0]));
+  };
   for (const auto& any : blocks)
     std::visit(
         [&](const auto& runs) {
@@ -359,7 +240,12 @@ void Interpolant<Scalar>::Binding::count_bytes() {
 template <class Scalar>
 Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, const InterpolationRule& rule,
                                  const Reconstruction* reconstruction)
-    : Interpolant(mesh, embedding, rule, reconstruction, {}, mesh.num_vertices(), mesh.num_cells()) {}
+    : Interpolant(mesh, embedding, binding_order(mesh, embedding), rule, reconstruction) {}
+
+template <class Scalar>
+Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, const BindingOrder& order,
+                                 const InterpolationRule& rule, const Reconstruction* reconstruction)
+    : Interpolant(mesh, embedding, order, rule, reconstruction, {}, mesh.num_vertices(), mesh.num_cells()) {}
 
 template <class Scalar>
 Interpolant<Scalar>::Interpolant(const Grid& grid, const Embedding& embedding, const InterpolationRule& rule,
@@ -367,21 +253,20 @@ Interpolant<Scalar>::Interpolant(const Grid& grid, const Embedding& embedding, c
   if (embedding.gdim != grid.gdim())
     raise("points embedded in {} dimensions, but the grid has {}", embedding.gdim, grid.gdim());
   const GridPart part = active_part(grid, embedding);
-  *this = Interpolant(part.mesh, part.embedding, rule, reconstruction, part.vertices, grid.num_vertices(),
-                      grid.num_cells());
+  *this = Interpolant(part.mesh, part.embedding, binding_order(part.mesh, part.embedding), rule, reconstruction,
+                      part.vertices, grid.num_vertices(), grid.num_cells());
 }
 
 template <class Scalar>
-Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, const InterpolationRule& rule,
-                                 const Reconstruction* reconstruction, std::span<const Index> numbers,
-                                 Index num_vertices, Index num_cells) {
+Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, const BindingOrder& order,
+                                 const InterpolationRule& rule, const Reconstruction* reconstruction,
+                                 std::span<const Index> numbers, Index num_vertices, Index num_cells) {
   if (embedding.gdim != mesh.gdim())
     raise("points embedded in {} dimensions, but the mesh has {}", embedding.gdim, mesh.gdim());
   auto binding = std::make_unique<Binding>();
   binding->rule = rule;
   binding->gdim = mesh.gdim();
-  const CellOrder order = order_cells(mesh, embedding);
-  binding->vertices = vertices_by_first_use(mesh, order.cells);
+  binding->vertices = order.vertices;
   binding->num_active = static_cast<Index>(binding->vertices.size());
   std::vector<Index> number(static_cast<std::size_t>(num_vertices), -1), part_number;
   if (!numbers.empty()) part_number.assign(numbers.size(), -1);
@@ -413,10 +298,8 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
                             binding->permutation.data() + base);
     if constexpr (E::affine)
       if (rule.needs_gradients() && !rule.needs_hessians())
-        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index run, int i, int j) -> ReferencePoint<E> {
-          const std::span<const Index> vertices = mesh.cell_vertices(order.cells[members[run]]);
-          const auto position = [&](int node) { return mesh.vertices().row(vertices[node]).template head<E::dim>(); };
-          return (position(j) - position(i)).transpose();
+        runs.edges = edge_windows<E::dim, Scalar>(runs.nodes, [&](Index node) {
+          return mesh.vertices().row(order.vertices[node]).template head<E::dim>().transpose();
         });
     base += runs.num_points();
     binding->blocks.emplace_back(std::move(runs));
@@ -442,14 +325,18 @@ template Interpolant<float>::Interpolant(const Mesh&, const Embedding&, const In
                                          const Reconstruction*);
 template Interpolant<double>::Interpolant(const Mesh&, const Embedding&, const InterpolationRule&,
                                           const Reconstruction*);
+template Interpolant<float>::Interpolant(const Mesh&, const Embedding&, const BindingOrder&, const InterpolationRule&,
+                                         const Reconstruction*);
+template Interpolant<double>::Interpolant(const Mesh&, const Embedding&, const BindingOrder&, const InterpolationRule&,
+                                          const Reconstruction*);
 template Interpolant<float>::Interpolant(const Grid&, const Embedding&, const InterpolationRule&,
                                          const Reconstruction*);
 template Interpolant<double>::Interpolant(const Grid&, const Embedding&, const InterpolationRule&,
                                           const Reconstruction*);
-// The one that both end in.
-template Interpolant<float>::Interpolant(const Mesh&, const Embedding&, const InterpolationRule&, const Reconstruction*,
-                                         std::span<const Index>, Index, Index);
-template Interpolant<double>::Interpolant(const Mesh&, const Embedding&, const InterpolationRule&,
+// The one that all end in.
+template Interpolant<float>::Interpolant(const Mesh&, const Embedding&, const BindingOrder&, const InterpolationRule&,
+                                         const Reconstruction*, std::span<const Index>, Index, Index);
+template Interpolant<double>::Interpolant(const Mesh&, const Embedding&, const BindingOrder&, const InterpolationRule&,
                                           const Reconstruction*, std::span<const Index>, Index, Index);
 
 // Weighted points are bound in a file of their own.

@@ -66,8 +66,8 @@ struct Interpolant<Scalar>::Binding {
   struct Runs {
     using element = E;
     Index base = 0;  // sorted position of the block's first point
-    std::vector<std::array<Index, E::num_nodes>> nodes;
-    std::vector<std::array<std::array<Scalar, E::dim>, E::num_nodes>> rest;
+    LargeArray<std::array<Index, E::num_nodes>> nodes;
+    LargeArray<std::array<std::array<Scalar, E::dim>, E::num_nodes>> rest;
     std::vector<Index> first;
     std::vector<std::uint8_t> affine;
     std::vector<Scalar> local;
@@ -102,8 +102,8 @@ struct Interpolant<Scalar>::Binding {
   struct Stencils {
     int width = 0;  // weights of an entry: of the gradient, then of the Hessian
     std::vector<Offset> first_group{0};
-    std::vector<Index> neighbors;
-    std::vector<Scalar> weights;
+    LargeArray<Index> neighbors;
+    LargeArray<Scalar> weights;
 
     Index num_rows() const { return static_cast<Index>(first_group.size() - 1); }
     Offset begin(Offset row) const { return 4 * first_group[row]; }

@@ -1,6 +1,7 @@
 #include "framework/large_array.hpp"
 
 #include <cstdint>
+#include <cstring>
 #include <new>
 #ifdef __linux__
 #include <sys/mman.h>
@@ -13,6 +14,13 @@ namespace {
 constexpr std::size_t large_page = std::size_t{2} << 20, small_page = 4096;
 
 bool is_large(std::size_t bytes) { return bytes >= 2 * large_page; }
+
+void* moved(void* memory, std::size_t bytes, std::size_t fewer) {
+  void* const result = allocate_large(fewer);
+  std::memcpy(result, memory, fewer);
+  free_large(memory, bytes);
+  return result;
+}
 
 }  // namespace
 
@@ -43,10 +51,19 @@ void free_large(void* memory, std::size_t bytes) {
   munmap(memory, bytes);
 }
 
+void* shrink_large(void* memory, std::size_t bytes, std::size_t fewer) {
+  if (!is_large(fewer)) return moved(memory, bytes, fewer);
+  const std::size_t end = (bytes + small_page - 1) / small_page * small_page,
+                    kept = (fewer + small_page - 1) / small_page * small_page;
+  if (kept < end) munmap(static_cast<char*>(memory) + kept, end - kept);
+  return memory;
+}
+
 #else
 
 void* allocate_large(std::size_t bytes) { return ::operator new(bytes); }
 void free_large(void* memory, std::size_t) { ::operator delete(memory); }
+void* shrink_large(void* memory, std::size_t bytes, std::size_t fewer) { return moved(memory, bytes, fewer); }
 
 #endif
 

@@ -8,6 +8,7 @@
 
 #include "framework/cell_extent.hpp"
 #include "framework/error.hpp"
+#include "framework/large_array.hpp"
 #include "framework/tangent_plane.hpp"
 
 namespace halfgrad {
@@ -154,6 +155,7 @@ IndexTable vertex_cells(const Mesh& mesh) {
   };
   each_corner([&](Index v, Index) { ++table.offsets[v + 1]; });
   std::partial_sum(table.offsets.begin(), table.offsets.end(), table.offsets.begin());
+  reserve_large(table.entries, table.offsets.back());
   table.entries.resize(table.offsets.back());
   std::vector<Offset> next(table.offsets.begin(), table.offsets.end() - 1);
   each_corner([&](Index v, Index c) { table.entries[next[v]++] = c; });

@@ -15,10 +15,6 @@ namespace halfgrad {
 
 namespace {
 
-void add_adjacent(const CellGradients& cells, Index vertex, CellStar& star) {
-  for (const Index cell : cells.cells_of(vertex)) star.add(vertex, cell);
-}
-
 bool on_vertex(const Vector& offset) { return !(offset.squaredNorm() > 0); }
 
 // Weights by inverse distance. Far from the origin rounding may put a centroid onto the vertex: in the limit the
@@ -35,20 +31,24 @@ template <int D>
 void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
   using Direction = Eigen::Matrix<double, D, 1>;
   using Square = Eigen::Matrix<double, D, D>;
-  // The upper triangle in numbers of its own: as a matrix it would go through memory for every cell.
-  double upper[D][D] = {};
-  for (int a = 0; a < D; ++a) upper[a][a] = epsilon;
-  Direction sum = Direction::Zero();
-  for (const Vector& offset : star.offsets) {
-    star.weights.push_back(1 / offset.template head<D>().norm());
-    const Direction direction = offset.template head<D>() * star.weights.back();
-    for (int a = 0; a < D; ++a)
-      for (int b = a; b < D; ++b) upper[a][b] += direction[a] * direction[b];
-    sum += direction;
+  // Roots and quotients apart, several at a time: they take longer than all else.
+  star.weights.clear();
+  for (const Vector& offset : star.offsets) star.weights.push_back(offset.template head<D>().squaredNorm());
+  Eigen::Map<Eigen::ArrayXd> closenesses(star.weights.data(), static_cast<Eigen::Index>(star.weights.size()));
+  if (!(closenesses > 0).all()) return weigh_by_distance(star);
+  closenesses = closenesses.sqrt().inverse();
+  // As numbers and a full square: parts of Eigen's vectors would go through memory for every cell.
+  double moments[D][D] = {}, sums[D] = {};
+  for (int a = 0; a < D; ++a) moments[a][a] = epsilon;
+  for (std::size_t k = 0; k < star.weights.size(); ++k) {
+    double direction[D];
+    for (int a = 0; a < D; ++a) direction[a] = star.offsets[k][a] * star.weights[k];
+    for (int a = 0; a < D; ++a) {
+      for (int b = 0; b < D; ++b) moments[a][b] += direction[a] * direction[b];
+      sums[a] += direction[a];
+    }
   }
-  Square normal;
-  for (int a = 0; a < D; ++a)
-    for (int b = 0; b < D; ++b) normal(a, b) = upper[std::min(a, b)][std::max(a, b)];
+  const Square normal = Eigen::Map<const Square>(moments[0]);
   // The trace of the inverse is between one and D times that of the least eigenvalue.
   const Square inverse = normal.inverse();
   const double least = 1 / inverse.trace();
@@ -57,7 +57,7 @@ void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
         "chandrashekar_garg: the weights of vertex {} are not determined with epsilon {} (least eigenvalue {:.3g}): "
         "use epsilon > 0",
         vertex, epsilon, symmetric_eigen(normal).values[0]);
-  const Direction lambda = -(inverse * sum);
+  const Direction lambda = -(inverse * Eigen::Map<const Direction>(sums));
   double total = 0, magnitude = 0;
   for (std::size_t k = 0; k < star.weights.size(); ++k) {
     const double closeness = star.weights[k];
@@ -75,7 +75,6 @@ void weigh_consistently(double epsilon, Index vertex, CellStar& star) {
 void weigh_consistently(int gdim, double epsilon, Index vertex, CellStar& star) {
   static_assert(max_gdim == 4);
   if (star.cells.empty()) return;
-  if (std::any_of(star.offsets.begin(), star.offsets.end(), on_vertex)) return weigh_by_distance(star);
   if (gdim == 1) return weigh_consistently<1>(epsilon, vertex, star);
   if (gdim == 2) return weigh_consistently<2>(epsilon, vertex, star);
   if (gdim == 3) return weigh_consistently<3>(epsilon, vertex, star);
@@ -87,36 +86,40 @@ void weigh_consistently(int gdim, double epsilon, Index vertex, CellStar& star) 
 void CellStar::clear() {
   cells.clear();
   offsets.clear();
-  volumes.clear();
   weights.clear();
-  members_.clear();
+  places_.clear();
   if (known_.size() < max_known) return;
   known_.clear();
-  places_.clear();
+  known_places_.clear();
 }
 
-void CellStar::add(Index vertex, Index cell) {
-  Index& place = places_.of(cell);
-  if (place < 0) {
-    place = static_cast<Index>(known_.size());
-    const CellGradient gradient = geometry_->gradient(cell);
-    known_.push_back(gradient.volume);
-    known_.insert(known_.end(), gradient.centroid.begin(), gradient.centroid.end());
-    known_.insert(known_.end(), gradient.weights.data(), gradient.weights.data() + gradient.weights.size());
+Index CellStar::learn(Index cell) {
+  const auto place = static_cast<Index>(known_.size());
+  const CellGradient gradient = geometry_->gradient(cell);
+  known_.push_back(gradient.volume);
+  known_.insert(known_.end(), gradient.centroid.begin(), gradient.centroid.end());
+  known_.insert(known_.end(), gradient.weights.data(), gradient.weights.data() + gradient.weights.size());
+  return place;
+}
+
+void CellStar::add(Index vertex, std::span<const Index> more) {
+  const Eigen::Index gdim = geometry_->gdim();
+  const double* position = geometry_->vertices().data() + vertex * gdim;
+  for (const Index cell : more) {
+    Index& place = known_places_.of(cell);
+    if (place < 0) place = learn(cell);
+    const double volume = known_[place], *const centroid = &known_[place] + 1;
+    if (!(volume > 0)) continue;
+    cells.push_back(cell);
+    places_.push_back(place);
+    Vector& offset = offsets.emplace_back(gdim);
+    for (Eigen::Index a = 0; a < gdim; ++a) offset[a] = centroid[a] - position[a];
   }
-  const double volume = known_[place], *const centroid = &known_[place] + 1;
-  if (!(volume > 0)) return;
-  cells.push_back(cell);
-  members_.push_back(place);
-  volumes.push_back(volume);
-  const Points& vertices = geometry_->vertices();
-  Vector& offset = offsets.emplace_back(vertices.cols());
-  for (Eigen::Index a = 0; a < vertices.cols(); ++a) offset[a] = centroid[a] - vertices(vertex, a);
 }
 
 std::span<const double* const> CellStar::gradients() {
   gradients_.clear();
-  for (const Index member : members_) gradients_.push_back(&known_[member] + 1 + geometry_->gdim());
+  for (const Index place : places_) gradients_.push_back(&known_[place] + 1 + geometry_->gdim());
   return gradients_;
 }
 
@@ -147,18 +150,18 @@ Reconstruction CellAverage::reconstruct(const CellGradients& cells, std::span<co
 }
 
 void UnweightedAverage::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
-  add_adjacent(cells, vertex, star);
+  star.add(vertex, cells.cells_of(vertex));
   star.weights.assign(star.cells.size(), 1.0);
 }
 
 void InverseDistance::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
-  add_adjacent(cells, vertex, star);
+  star.add(vertex, cells.cells_of(vertex));
   weigh_by_distance(star);
 }
 
 void VolumeAverage::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
-  add_adjacent(cells, vertex, star);
-  star.weights = star.volumes;
+  star.add(vertex, cells.cells_of(vertex));
+  for (std::size_t k = 0; k < star.cells.size(); ++k) star.weights.push_back(star.volume(k));
 }
 
 ChandrashekarGarg::ChandrashekarGarg(const ChandrashekarGargOptions& options) : options_(options) {
@@ -166,7 +169,7 @@ ChandrashekarGarg::ChandrashekarGarg(const ChandrashekarGargOptions& options) : 
 }
 
 void ChandrashekarGarg::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
-  add_adjacent(cells, vertex, star);
+  star.add(vertex, cells.cells_of(vertex));
   weigh_consistently(cells.gdim(), options_.epsilon, vertex, star);
 }
 
@@ -176,7 +179,7 @@ Knn::Knn(const KnnOptions& options) : options_(options) {
 }
 
 void Knn::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
-  add_adjacent(cells, vertex, star);
+  star.add(vertex, cells.cells_of(vertex));
   // Rings of cells that share a vertex, so that the choice never jumps a gap of the mesh: grown until they hold k
   // further cells, then once more, so that a near cell of the next ring is not missed.
   const std::span<const Index> adjacent = cells.cells_of(vertex);
@@ -192,7 +195,7 @@ void Knn::weigh(const CellGradients& cells, Index vertex, CellStar& star) const 
     next.erase(std::unique(next.begin(), next.end()), next.end());
     ring.clear();
     std::set_difference(next.begin(), next.end(), found.begin(), found.end(), std::back_inserter(ring));
-    for (Index cell : ring) further.add(vertex, cell);
+    further.add(vertex, ring);
     const auto middle = static_cast<std::ptrdiff_t>(found.size());
     found.insert(found.end(), ring.begin(), ring.end());
     std::inplace_merge(found.begin(), found.begin() + middle, found.end());
@@ -208,7 +211,7 @@ void Knn::weigh(const CellGradients& cells, Index vertex, CellStar& star) const 
     cut = distances[options_.k - 1] * (1 + 2 * distance_tie);
   }
   for (std::size_t i = 0; i < further.cells.size(); ++i)
-    if (further.offsets[i].squaredNorm() <= cut) star.add(vertex, further.cells[i]);
+    if (further.offsets[i].squaredNorm() <= cut) star.add(vertex, {&further.cells[i], 1});
   weigh_consistently(cells.gdim(), options_.epsilon, vertex, star);
 }
 

@@ -20,23 +20,25 @@ class CellStar {
  public:
   std::vector<Index> cells;
   std::vector<Vector> offsets;  ///< centroid − vertex
-  std::vector<double> volumes;
   std::vector<double> weights;  ///< one a cell
 
-  explicit CellStar(const CellGradients& geometry) : geometry_(&geometry), places_(16) {}
+  explicit CellStar(const CellGradients& geometry) : geometry_(&geometry), known_places_(16) {}
   void clear();
-  /// Adds a cell, seen from the vertex, unless it is degenerate.
-  void add(Index vertex, Index cell);
+  /// Adds cells, seen from the vertex, but for degenerate ones.
+  void add(Index vertex, std::span<const Index> more);
+  double volume(std::size_t k) const { return known_[places_[k]]; }
   /// The gradient stencils of the cells, #nodes × gdim each, valid until cells are added.
   std::span<const double* const> gradients();
 
  private:
-  static constexpr std::size_t max_known = 80'000;  // 1.3 MB, 10,000 tetrahedra
+  static constexpr std::size_t max_known = 80'000;  // 0.6 MB, 5,000 tetrahedra
+
+  Index learn(Index cell);
 
   const CellGradients* geometry_;
-  std::vector<double> known_;   // volume, centroid, gradient stencil of one cell after the other
-  Places places_;               // where a cell's begin
-  std::vector<Index> members_;  // the same, one a cell of the star
+  std::vector<double> known_;  // volume, centroid, gradient stencil of one cell after the other
+  Places known_places_;        // where a cell's begin
+  std::vector<Index> places_;  // the same, one a cell of the star
   std::vector<const double*> gradients_;
 };
 

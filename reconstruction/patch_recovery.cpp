@@ -55,7 +55,7 @@ Spr::Spr(const SprOptions& options) : options_(options) {
 
 void Spr::weigh(const CellGradients& cells, Index vertex, CellStar& star) const {
   const int rings = options_.rings + (cells.on_boundary(vertex) ? 1 : 0);
-  for (Index cell : cells_within(cells, vertex, rings)) star.add(vertex, cell);
+  star.add(vertex, cells_within(cells, vertex, rings));
   const auto count = static_cast<Eigen::Index>(star.cells.size());
   if (count == 0) return;
   MatrixXd centroids(count, cells.gdim());

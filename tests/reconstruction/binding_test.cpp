@@ -54,5 +54,23 @@ TEST(Binding, OfAPartOfALargeMeshIsThatOfTheSmallMesh) {
   EXPECT_EQ(small.bytes, large.bytes);
 }
 
+TEST(Binding, WithTheOrderAtHandIsTheSame) {
+  const Mesh mesh = test::lattice<Tetrahedron>(4, 0.2, 1);
+  const Embedding embedding = embed(mesh, test::random_points_inside(mesh, 300, 2));
+  const BindingOrder order = binding_order(mesh, embedding);
+  EXPECT_EQ(order.vertices, active_vertices(mesh, embedding));
+  ASSERT_EQ(order.first_point.size(), order.cells.size() + 1);
+  ASSERT_EQ(order.points.size(), 300U);
+  for (std::size_t c = 0; c < order.cells.size(); ++c)
+    for (Index p = order.first_point[c]; p < order.first_point[c + 1]; ++p)
+      EXPECT_EQ(embedding.cells[order.points[p]], order.cells[c]);
+  const Reconstruction stencils = ChandrashekarGarg().reconstruct(CellGradients(mesh), order.vertices);
+  const Interpolant<double> with(mesh, embedding, order, named_rule("phong"), &stencils),
+      without(mesh, embedding, named_rule("phong"), &stencils);
+  const Values<double> values = mesh.vertices().array().sin();
+  EXPECT_EQ(with.evaluate(values), without.evaluate(values));
+  EXPECT_EQ(with.report().bytes, without.report().bytes);
+}
+
 }  // namespace
 }  // namespace halfgrad
