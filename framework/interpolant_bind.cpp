@@ -1,4 +1,5 @@
 // Bind: runs of points, the edges of their cells and the stencils of vertices, in the order of a binding.
+#include <algorithm>
 #include <numeric>
 
 #include "framework/binding_order.hpp"
@@ -263,6 +264,9 @@ Interpolant<Scalar>::Interpolant(const Mesh& mesh, const Embedding& embedding, c
                                  std::span<const Index> numbers, Index num_vertices, Index num_cells) {
   if (embedding.gdim != mesh.gdim())
     raise("points embedded in {} dimensions, but the mesh has {}", embedding.gdim, mesh.gdim());
+  const auto num_in_cells = std::ranges::count_if(embedding.cells, [](Index cell) { return cell >= 0; });
+  if (static_cast<std::ptrdiff_t>(order.points.size()) != num_in_cells)
+    raise("a binding order of {} points for an embedding that has {} in cells", order.points.size(), num_in_cells);
   auto binding = std::make_unique<Binding>();
   binding->rule = rule;
   binding->gdim = mesh.gdim();

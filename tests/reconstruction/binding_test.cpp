@@ -2,6 +2,7 @@
 
 #include "framework/interpolant.hpp"
 #include "reconstruction/cell_averages.hpp"
+#include "tests/support/message_of.hpp"
 #include "tests/support/test_meshes.hpp"
 
 namespace halfgrad {
@@ -70,6 +71,10 @@ TEST(Binding, WithTheOrderAtHandIsTheSame) {
   const Values<double> values = mesh.vertices().array().sin();
   EXPECT_EQ(with.evaluate(values), without.evaluate(values));
   EXPECT_EQ(with.report().bytes, without.report().bytes);
+  BindingOrder other = order;
+  other.points.pop_back();
+  EXPECT_EQ(message_of([&] { Interpolant<double>(mesh, embedding, other, named_rule("phong"), &stencils); }),
+            "a binding order of 299 points for an embedding that has 300 in cells");
 }
 
 }  // namespace
