@@ -184,7 +184,10 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
   const auto has_plain_runs = [&]<class E>(const Runs<E>& runs) {
     return !is_fast(runs) || (!E::affine && !runs.extrapolates.empty());
   };
-  bool any_fast = false, any_plain = weighted.num_points() > 0;
+  const bool any_weighted = weighted.num_points() > 0;
+  const bool weighted_fast = any_weighted && options.kernel == Kernel::fast && is_fast_width(values.cols()) &&
+                             gdim <= kernels::max_simplex_dim;
+  bool any_fast = weighted_fast, any_plain = any_weighted && !weighted_fast;
   for (const AnyRuns& any : blocks)
     std::visit(
         [&](const auto& runs) {
@@ -210,7 +213,8 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
     if (num_weights > 0) {
       Scalar* target = reserve<Scalar>(workspace.lines, static_cast<Offset>(num_active) * 4 * (1 + num_weights));
       lines = target;
-      const auto scale = line_scale<Scalar>(fast, gdim);
+      auto scale = line_scale<Scalar>(fast, gdim);
+      if (any_weighted) scale.fill(1);  // the coefficients of points have the rule's factors
       if (from_stencils) {
         vertex_lines(positions, scale, workspace, target);
       } else {
@@ -235,8 +239,10 @@ void Interpolant<Scalar>::Binding::frame(const Values<Scalar>& values, const Val
     for (Index run = begin; run < end; ++run)
       if (runs.extrapolates[run]) plain(run, run + 1);
   });
-  if (weighted.num_points() > 0)
-    weighted_point_stage(values, gradients != nullptr ? *gradients : none, hessians != nullptr ? *hessians : none, out);
+  if (weighted_fast)
+    weighted_point_stage(static_cast<int>(values.cols()), lines, out);
+  else if (any_weighted)
+    plain_weighted_stage(values, gradients != nullptr ? *gradients : none, hessians != nullptr ? *hessians : none, out);
   std::fill(out + static_cast<Offset>(num_served) * values.cols(),
             out + static_cast<Offset>(report.num_points) * values.cols(), std::numeric_limits<Scalar>::quiet_NaN());
 }

@@ -119,7 +119,7 @@ struct Interpolant<Scalar>::Binding {
     std::vector<Scalar> edges, metrics, caution;  // kernels/blend_stage.hpp
   };
 
-  // Points given by their weights: what a point reads of each vertex, a | c_1 … c_d | (q_11 …), and β apart.
+  // Points given by their weights: what a point reads of each vertex, a | (c_1 … c_d) | (q_11 …), and β apart.
   struct Weighted {
     std::vector<Offset> first{0};  // [point]
     std::vector<Index> nodes;
@@ -127,6 +127,10 @@ struct Interpolant<Scalar>::Binding {
 
     Index num_points() const { return static_cast<Index>(first.size() - 1); }
   };
+  // Numbers that a point reads of each vertex, β apart.
+  int weighted_width() const {
+    return 1 + (rule.needs_gradients() ? gdim : 0) + (rule.needs_hessians() ? num_symmetric(gdim) : 0);
+  }
 
   InterpolationRule rule;
   BindReport report;
@@ -223,7 +227,8 @@ struct Interpolant<Scalar>::Binding {
                          const Values<Scalar>& gradients, const Values<Scalar>& hessians, double tolerance,
                          Scalar* out) const;
 
-  void weighted_point_stage(const Values<Scalar>& values, const Values<Scalar>& gradients,
+  void weighted_point_stage(int columns, const Scalar* lines, Scalar* out) const;
+  void plain_weighted_stage(const Values<Scalar>& values, const Values<Scalar>& gradients,
                             const Values<Scalar>& hessians, Scalar* out) const;
   // Adds β-weighted rows of vertex data (#active × #columns) to `out`.
   void add_weighted_means(const Values<Scalar>& vertex_data, Values<Scalar>& out) const;

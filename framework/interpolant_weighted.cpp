@@ -1,6 +1,7 @@
-// Points given by their weights: coefficients of the formula at bind, plain sums every frame.
+// Points given by their weights: coefficients of the formula at bind, sums every frame.
 #include "framework/interpolant_binding.hpp"
 #include "framework/kernels/formulas.hpp"
+#include "framework/kernels/weighted_stage.hpp"
 #include "framework/weighted_points.hpp"
 
 namespace halfgrad {
@@ -8,7 +9,7 @@ namespace halfgrad {
 namespace {
 
 // Coefficients of one point with at most max_nodes vertices; unused places have weight zero, and with it no part in any
-// formula. Appends a | c_1 … c_d | (q_11 …) for each vertex.
+// formula. Appends a | (c_1 … c_d) | (q_11 …) for each vertex.
 template <int d, class Scalar>
 void append_coefficients(const WeightedPoints& points, Index point, const InterpolationRule& rule,
                          std::vector<Scalar>& coefficients) {
@@ -22,7 +23,8 @@ void append_coefficients(const WeightedPoints& points, Index point, const Interp
   const auto found = kernels::point_coefficients<double, double, max_nodes, d>(rule, beta, rest);
   for (Offset i = 0; i < end - begin; ++i) {
     coefficients.push_back(static_cast<Scalar>(found.a[i]));
-    for (int k = 0; k < d; ++k) coefficients.push_back(static_cast<Scalar>(found.c[i][k]));
+    if (rule.needs_gradients())
+      for (int k = 0; k < d; ++k) coefficients.push_back(static_cast<Scalar>(found.c[i][k]));
     if (rule.needs_hessians())
       for (int k = 0; k < num_symmetric(d); ++k) coefficients.push_back(static_cast<Scalar>(found.q[i][k]));
   }
@@ -128,10 +130,25 @@ Interpolant<Scalar>::Interpolant(const WeightedPoints& points, const Interpolati
 }
 
 template <class Scalar>
-void Interpolant<Scalar>::Binding::weighted_point_stage(const Values<Scalar>& values, const Values<Scalar>& gradients,
+void Interpolant<Scalar>::Binding::weighted_point_stage(int columns, const Scalar* lines, Scalar* out) const {
+  const kernels::WeightedStage<Scalar> stage{.num_columns = columns,
+                                             .num_fours = weighted_width(),
+                                             .first = weighted.first.data(),
+                                             .nodes = weighted.nodes.data(),
+                                             .coefficients = weighted.coefficients.data(),
+                                             .lines = lines,
+                                             .out = out};
+  const Offset num_points = weighted.num_points();
+  parallel_for(
+      num_points, num_points < parallel_threshold ? num_points : points_per_task,
+      [&](std::int64_t begin, std::int64_t end) { stage.run(static_cast<Index>(begin), static_cast<Index>(end)); });
+}
+
+template <class Scalar>
+void Interpolant<Scalar>::Binding::plain_weighted_stage(const Values<Scalar>& values, const Values<Scalar>& gradients,
                                                         const Values<Scalar>& hessians, Scalar* out) const {
   const Eigen::Index columns = values.cols();
-  const int symmetric = rule.needs_hessians() ? num_symmetric(gdim) : 0, width = 1 + gdim + symmetric;
+  const int symmetric = rule.needs_hessians() ? num_symmetric(gdim) : 0, width = weighted_width();
   const bool with_gradients = rule.needs_gradients();
   const Offset num_points = weighted.num_points();
   parallel_for(num_points, num_points < parallel_threshold ? num_points : points_per_task,
@@ -169,7 +186,7 @@ void Interpolant<Scalar>::Binding::add_weighted_means(const Values<Scalar>& vert
 
 template <class Scalar>
 void Interpolant<Scalar>::Binding::add_weighted_entries(Entries& entries) const {
-  const int symmetric = rule.needs_hessians() ? num_symmetric(gdim) : 0, width = 1 + gdim + symmetric;
+  const int width = weighted_width();
   for (Index p = 0; p < weighted.num_points(); ++p)
     for (Offset e = weighted.first[p]; e < weighted.first[p + 1]; ++e) {
       std::array<double, 1 + max_gdim + num_symmetric(max_gdim)> a{};
@@ -180,9 +197,11 @@ void Interpolant<Scalar>::Binding::add_weighted_entries(Entries& entries) const 
 
 template Interpolant<float>::Interpolant(const WeightedPoints&, const InterpolationRule&, const Reconstruction*);
 template Interpolant<double>::Interpolant(const WeightedPoints&, const InterpolationRule&, const Reconstruction*);
-template void Interpolant<float>::Binding::weighted_point_stage(const Values<float>&, const Values<float>&,
+template void Interpolant<float>::Binding::weighted_point_stage(int, const float*, float*) const;
+template void Interpolant<double>::Binding::weighted_point_stage(int, const double*, double*) const;
+template void Interpolant<float>::Binding::plain_weighted_stage(const Values<float>&, const Values<float>&,
                                                                 const Values<float>&, float*) const;
-template void Interpolant<double>::Binding::weighted_point_stage(const Values<double>&, const Values<double>&,
+template void Interpolant<double>::Binding::plain_weighted_stage(const Values<double>&, const Values<double>&,
                                                                  const Values<double>&, double*) const;
 template void Interpolant<float>::Binding::add_weighted_means(const Values<float>&, Values<float>&) const;
 template void Interpolant<double>::Binding::add_weighted_means(const Values<double>&, Values<double>&) const;

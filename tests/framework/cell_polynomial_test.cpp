@@ -4,7 +4,10 @@
 #include <hwy/highway.h>
 #include <tbb/global_control.h>
 
+#include <numeric>
+
 #include "framework/interpolant.hpp"
+#include "framework/weighted_points.hpp"
 #include "reconstruction/adaptive.hpp"
 #include "reconstruction/cell_averages.hpp"
 #include "support/test_meshes.hpp"
@@ -190,6 +193,55 @@ TEST(CellPolynomial, EqualsThePlainFormulasOnHexahedra) {
 TEST(CellPolynomial, EqualsThePlainFormulasOnPyramids) {
   expect_fast_equals_plain<Pyramid, float>();
   expect_fast_equals_plain<Pyramid, double>();
+}
+
+// Points with weights on one to eight vertices, and some not found.
+template <class Scalar>
+void expect_weighted_equals_plain(int gdim) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  WeightedPoints points;
+  points.gdim = gdim;
+  points.num_vertices = 50;
+  for (int p = 0; p < 200; ++p) {
+    const int count = p % 17 == 5 ? 0 : 1 + p % max_nodes;
+    std::vector<double> weights(static_cast<std::size_t>(count));
+    for (double& weight : weights) weight = 0.1 + uniform(random);
+    const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+    for (double weight : weights) {
+      points.vertices.push_back(static_cast<Index>(random() % 50));
+      points.weights.push_back(weight / sum);
+      for (int k = 0; k < gdim; ++k) points.arms.push_back(0.3 * (uniform(random) - 0.5));
+    }
+    points.offsets.push_back(static_cast<Offset>(points.vertices.size()));
+  }
+  for (const NamedRule& named : named_rules()) {
+    if (named.rule.formula == Formula::quadratic10) continue;
+    const Interpolant<Scalar> interpolant(points, named.rule, nullptr);
+    const Interpolant<double> reference(points, named.rule, nullptr);
+    const Eigen::Index num_active = interpolant.report().num_active_vertices;
+    for (Eigen::Index columns = 1; columns <= 3; ++columns) {
+      SCOPED_TRACE(fmt::format("{} with {} columns in {} dimensions", named.name, columns, gdim));
+      const Values<Scalar> values = random_values(50, columns, 1).template cast<Scalar>();
+      const Values<Scalar> gradients = random_values(num_active, columns * gdim, 2).template cast<Scalar>();
+      const Values<Scalar> hessians =
+          random_values(num_active, columns * num_symmetric(gdim), 3).template cast<Scalar>();
+      Values<double> expected;
+      reference.evaluate_given(values.template cast<double>(), gradients.template cast<double>(),
+                               hessians.template cast<double>(), expected, {.kernel = Kernel::plain});
+      on_every_target([&] {
+        Values<Scalar> result;
+        interpolant.evaluate_given(values, gradients, hessians, result);
+        EXPECT_LT(largest_difference(result, expected), 2 * tolerated<Scalar>);
+      });
+    }
+  }
+}
+TEST(CellPolynomial, PointsByTheirWeightsEqualThePlainFormulas) {
+  for (int gdim = 1; gdim <= 3; ++gdim) {
+    expect_weighted_equals_plain<float>(gdim);
+    expect_weighted_equals_plain<double>(gdim);
+  }
 }
 
 // Past the number of points from which a frame takes several threads: ranges of windows meet where threads do.
