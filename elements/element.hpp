@@ -63,28 +63,31 @@ concept Element = requires(const ReferencePoint<E>& xi) {
   { E::margin(xi) } -> std::convertible_to<double>;
 };
 
-/// An element that also states its shape functions as polynomials in its variables η, which is what the fast path
-/// evaluates. They are ξ, or for a RationalElement coordinates of its own.
+/// An element with a rational function of ξ beside the polynomials:
 ///
-/// shape_monomials      std::array of exponents: monomial m is Π_k η_k^shape_monomials[m][k]; the first is 1. What
-///                      products of two have as exponents of η_k, together with given ones of the variables before,
-///                      must be 0 … n
-/// shape_coefficients   β_i = Σ_m shape_coefficients[m][i] · monomial m, of 0 and ± 1
+/// rational             three affine functions n_1, n_2, m as coefficients of 1, ξ_1, … ξ_dim; the function is n_1 n_2
+/// / m
+///                      where m > least_denominator, else 0
+template <class E>
+concept RationalElement = Element<E> && requires {
+  { E::rational[2][E::dim] } -> std::convertible_to<double>;
+  { E::least_denominator } -> std::convertible_to<double>;
+};
+
+/// The variables of shape functions: ξ, and the rational function where there is one.
+template <class E>
+inline constexpr int num_variables = RationalElement<E> ? E::dim + 1 : E::dim;
+
+/// An element that also states its shape functions as polynomials in its variables η, which is what the fast path
+/// evaluates:
+///
+/// shape_monomials      std::array of exponents: monomial m is Π_k η_k^shape_monomials[m][k]; the first is 1
+/// shape_coefficients   β_i = Σ_m shape_coefficients[m][i] · monomial m; that of 1 is node 0's alone
 template <class E>
 concept MonomialElement = Element<E> && requires {
   { E::shape_monomials.size() } -> std::convertible_to<std::size_t>;
-  { E::shape_monomials[0][E::dim - 1] } -> std::convertible_to<int>;
-  { E::shape_coefficients[0][E::num_nodes - 1] } -> std::convertible_to<int>;
-};
-
-/// One whose shape functions are no polynomials in ξ, but in other coordinates of the cell:
-///
-/// variables(ξ)         dim × 1
-/// reference_point(η)   its inverse
-template <class E>
-concept RationalElement = MonomialElement<E> && requires(const ReferencePoint<E>& xi) {
-  { E::variables(xi) } -> std::convertible_to<ReferencePoint<E>>;
-  { E::reference_point(xi) } -> std::convertible_to<ReferencePoint<E>>;
+  { E::shape_monomials[0][num_variables<E> - 1] } -> std::convertible_to<int>;
+  { E::shape_coefficients[0][E::num_nodes - 1] } -> std::convertible_to<double>;
 };
 
 /// One whose shape functions are polynomials in ξ.

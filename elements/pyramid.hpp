@@ -25,52 +25,42 @@ struct Pyramid {
       {{4, {0, 3, 2, 1}}, {3, {0, 1, 4}}, {3, {1, 2, 4}}, {3, {2, 3, 4}}, {3, {3, 0, 4}}}};
   static constexpr std::array<int, 8> cube_nodes = {0, 1, 3, 2, 4, 4, 4, 4};
 
-  static constexpr std::array<std::array<int, 3>, 5> shape_monomials = {
-      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {1, 0, 1}, {1, 1, 1}}};
-  static constexpr std::array<std::array<int, 5>, 5> shape_coefficients = {
-      {{0, 0, 0, 0, 1}, {1, 0, 0, 0, -1}, {-1, 1, 0, 0, 0}, {-1, 0, 0, 1, 0}, {1, -1, 1, -1, 0}}};
+  static constexpr std::array<std::array<double, 4>, 3> rational = {{{0, 1, 0, -0.5}, {0, 0, 1, -0.5}, {1, 0, 0, -1}}};
+  static constexpr double least_denominator = 1e-12;
+  static constexpr std::array<std::array<int, 4>, 5> shape_monomials = {
+      {{0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+  static constexpr std::array<std::array<double, 5>, 5> shape_coefficients = {
+      {{1, 0, 0, 0, 0}, {-1, 1, 0, 0, 0}, {-1, 0, 0, 1, 0}, {0, -0.5, 0, -0.5, 1}, {1, -1, 1, -1, 0}}};
 
   static Eigen::Matrix<double, 5, 3> nodes() {
     return (Eigen::Matrix<double, 5, 3>() << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0.5, 0.5, 1).finished();
   }
   static Eigen::Vector3d center() { return {0.5, 0.5, 0.25}; }
-  /// w, a/w, b/w: the cube that collapses onto the pyramid. All of its side w = 0 is the apex.
-  static Eigen::Vector3d variables(const Eigen::Vector3d& xi) {
-    const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2;
-    return w > 0 ? Eigen::Vector3d(w, a / w, b / w) : Eigen::Vector3d(w, 0, 0);
-  }
-  static Eigen::Vector3d reference_point(const Eigen::Vector3d& eta) {
-    const double top = 1 - eta[0];
-    return {eta[0] * eta[1] + top / 2, eta[0] * eta[2] + top / 2, top};
-  }
   static Eigen::Matrix<double, 5, 1> shape(const Eigen::Vector3d& xi) {
     const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2;
     // Any value of the rational term keeps Σβ = 1 and Σβ_i node_i = ξ; at the apex it is zero.
-    const double rational = w > 0 ? a * b / w : 0;
+    const double quotient = w > least_denominator ? a * b / w : 0;
     Eigen::Matrix<double, 5, 1> beta;
-    beta << w - a - b + rational, a - rational, rational, b - rational, xi[2];
+    beta << w - a - b + quotient, a - quotient, quotient, b - quotient, xi[2];
     return beta;
   }
   static Eigen::Matrix<double, 5, 3> shape_gradient(const Eigen::Vector3d& xi) {
     const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2;
     // The gradient depends on the direction from which the apex is reached; there it is taken along the axis.
-    const double p = w > apex ? a / w : 0.5, q = w > apex ? b / w : 0.5;
-    const Eigen::RowVector3d rational(q, p, p * q - (p + q) / 2);
+    const double p = w > least_denominator ? a / w : 0.5, q = w > least_denominator ? b / w : 0.5;
+    const Eigen::RowVector3d slope(q, p, p * q - (p + q) / 2);
     Eigen::Matrix<double, 5, 3> gradient;
     gradient << -1, -1, 0, 1, 0, -0.5, 0, 0, 0, 0, 1, -0.5, 0, 0, 1;
-    gradient.row(0) += rational;
-    gradient.row(1) -= rational;
-    gradient.row(2) += rational;
-    gradient.row(3) -= rational;
+    gradient.row(0) += slope;
+    gradient.row(1) -= slope;
+    gradient.row(2) += slope;
+    gradient.row(3) -= slope;
     return gradient;
   }
   static double margin(const Eigen::Vector3d& xi) {
     const double w = 1 - xi[2], a = xi[0] - xi[2] / 2, b = xi[1] - xi[2] / 2;
     return std::min({xi[2], a, w - a, b, w - b});
   }
-
- private:
-  static constexpr double apex = 1e-12;
 };
 
 }  // namespace halfgrad

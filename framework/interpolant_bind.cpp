@@ -104,13 +104,11 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder&
         permutation[p] = *points;
         // On a simplex a point outside differs from one inside by its ξ alone; elsewhere it keeps its offset apart.
         const bool outside = !outside_row.empty() && outside_row[*points] >= 0;
-        ReferencePoint<E> xi;
         for (int k = 0; k < d; ++k) {
-          xi[k] = embedding.local(*points, k);
-          if (E::affine && outside) xi[k] += embedding.outside[outside_row[*points]].offset[k];
+          double xi = embedding.local(*points, k);
+          if (E::affine && outside) xi += embedding.outside[outside_row[*points]].offset[k];
+          runs.local[static_cast<Offset>(p) * d + k] = static_cast<Scalar>(xi);
         }
-        if constexpr (RationalElement<E>) xi = E::variables(xi);
-        for (int k = 0; k < d; ++k) runs.local[static_cast<Offset>(p) * d + k] = static_cast<Scalar>(xi[k]);
         if (outside) runs.extrapolates[r] = 1;
       }
     }

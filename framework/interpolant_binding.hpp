@@ -56,8 +56,7 @@ struct Interpolant<Scalar>::Binding {
   //   nodes        [run][node]          number of the vertex
   //   rest         [run][node][axis]    rest position relative to the run's first node; one run more than there is
   //   first        [run]                position of the run's first point in the block
-  //   local        [point][axis]        the element's variables (ξ, but of a RationalElement); for simplices of a point
-  //                                     outside too
+  //   local        [point][axis]        ξ; for simplices of a point outside too
   //   edges        of simplices whose rule takes gradients but no Hessians (kernels/cell_polynomial.hpp)
   //   affine       [run]                1 where x(ξ) is affine (polynomial elements but simplices)
   //   offset       [point]              row of `offsets` for points outside, else −1 (empty where no point is outside)
@@ -81,7 +80,6 @@ struct Interpolant<Scalar>::Binding {
     ReferencePoint<E> xi(Index p) const {
       ReferencePoint<E> result;
       for (int k = 0; k < E::dim; ++k) result[k] = static_cast<double>(local[static_cast<Offset>(p) * E::dim + k]);
-      if constexpr (RationalElement<E>) result = E::reference_point(result);
       return result;
     }
     // Weights of one point.

@@ -12,7 +12,7 @@
 //                               of x_j − x_v; the vertex itself with weights of zero fills the last group
 //   nodes      [run][node]      number of the vertex; a run is the points of one cell
 //   rest       [run][node][axis] X_i − X_0
-//   local      [point][axis]    the element's variables η_1 … η_d (elements/element.hpp), mostly ξ
+//   local      [point][axis]    ξ_1 … ξ_d
 //   edges      of simplices: each edge once a window of window_size runs
 //     first    [window]         its first edge
 //     ends     [edge][2]        numbers of the vertices i, j

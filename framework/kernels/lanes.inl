@@ -19,14 +19,14 @@ using LaneTag = hn::CappedTag<T, 16>;
 template <class T>
 using LaneVector = hn::Vec<LaneTag<T>>;
 
-// The variables of as many points as there are lanes, one vector each.
+// ξ of as many points as there are lanes, one vector a coordinate.
 template <int count, class T>
-HWY_INLINE void load_points(const T* local, LaneVector<T>* eta) {
+HWY_INLINE void load_points(const T* local, LaneVector<T>* xi) {
   const LaneTag<T> tag;
   static_assert(1 <= count && count <= 3);
-  if constexpr (count == 1) eta[0] = hn::LoadU(tag, local);
-  if constexpr (count == 2) hn::LoadInterleaved2(tag, local, eta[0], eta[1]);
-  if constexpr (count == 3) hn::LoadInterleaved3(tag, local, eta[0], eta[1], eta[2]);
+  if constexpr (count == 1) xi[0] = hn::LoadU(tag, local);
+  if constexpr (count == 2) hn::LoadInterleaved2(tag, local, xi[0], xi[1]);
+  if constexpr (count == 3) hn::LoadInterleaved3(tag, local, xi[0], xi[1], xi[2]);
 }
 
 template <int columns, class T>
@@ -39,33 +39,41 @@ HWY_INLINE void store_points(const LaneVector<T>* f, T* out) {
 
 // β of the points, from the monomials of their variables.
 template <class E, class T>
-HWY_INLINE void weights(const LaneVector<T>* eta, LaneVector<T>* beta) {
+HWY_INLINE void weights(const LaneVector<T>* xi, LaneVector<T>* beta) {
   constexpr int n = E::num_nodes;
   const LaneTag<T> tag;
+  LaneVector<T> eta[num_variables<E>];
+  HALFGRAD_UNROLL
+  for (int k = 0; k < E::dim; ++k) eta[k] = xi[k];
+  if constexpr (RationalElement<E>) eta[E::dim] = rational_function<E>(xi);
   HALFGRAD_UNROLL
   for (int i = 0; i < n; ++i) beta[i] = hn::Zero(tag);
   unrolled<static_cast<int>(E::shape_monomials.size())>([&](auto m) HALFGRAD_LAMBDA {
     LaneVector<T> monomial = hn::Set(tag, T(1));
-    unrolled<E::dim>([&](auto k) HALFGRAD_LAMBDA {
+    unrolled<num_variables<E>>([&](auto k) HALFGRAD_LAMBDA {
       for (int power = 0; power < E::shape_monomials[m()][k()]; ++power) monomial = hn::Mul(monomial, eta[k()]);
     });
     unrolled<n>([&](auto i) HALFGRAD_LAMBDA {
-      constexpr int factor = E::shape_coefficients[m()][i()];
-      if constexpr (factor == 1) beta[i()] = hn::Add(beta[i()], monomial);
-      if constexpr (factor == -1) beta[i()] = hn::Sub(beta[i()], monomial);
+      constexpr auto factor = static_cast<T>(E::shape_coefficients[m()][i()]);
+      if constexpr (factor == 1)
+        beta[i()] = hn::Add(beta[i()], monomial);
+      else if constexpr (factor == -1)
+        beta[i()] = hn::Sub(beta[i()], monomial);
+      else if constexpr (factor != 0)
+        beta[i()] = hn::MulAdd(hn::Set(tag, factor), monomial, beta[i()]);
     });
   });
 }
 
 // Results at a vector of points. `differences` are [node][4] x_i − x_0, `rest` [node][axis].
 template <class E, Recipe recipe, int columns, class T>
-HWY_INLINE void evaluate_rule(const T* const* line, const T* differences, const T* rest, const LaneVector<T>* eta,
+HWY_INLINE void evaluate_rule(const T* const* line, const T* differences, const T* rest, const LaneVector<T>* xi,
                               LaneVector<T>* f) {
   constexpr int n = E::num_nodes, d = E::dim;
   using V = LaneVector<T>;
   const LaneTag<T> tag;
   V beta[n], position[d], squares = hn::Zero(tag), moment[d];
-  weights<E, T>(eta, beta);
+  weights<E, T>(xi, beta);
   HALFGRAD_UNROLL
   for (int k = 0; k < d; ++k) position[k] = moment[k] = hn::Zero(tag);
   for (int i = 1; i < n; ++i) {
@@ -126,17 +134,17 @@ HWY_NOINLINE void evaluate_lanes(const PointStage<T>& stage, Index begin, Index 
     for (Index p = stage.first[run]; p < stage.first[run + 1]; p += lanes) {
       const T* local = stage.local + static_cast<Offset>(p) * d;
       T* const out = stage.out + static_cast<Offset>(p) * columns;
-      LaneVector<T> eta[d], f[columns];
+      LaneVector<T> xi[d], f[columns];
       // Vectors are read and stored whole: the next run overwrites what was stored too much, except at the range's end.
       if (p + lanes <= last) {
-        load_points<d>(local, eta);
-        evaluate_rule<E, recipe, columns>(line, differences, rest, eta, f);
+        load_points<d>(local, xi);
+        evaluate_rule<E, recipe, columns>(line, differences, rest, xi, f);
         store_points<columns>(f, out);
       } else {
         HWY_ALIGN T some[d * lanes] = {}, results[columns * lanes];
         std::copy_n(local, (last - p) * d, some);
-        load_points<d>(some, eta);
-        evaluate_rule<E, recipe, columns>(line, differences, rest, eta, f);
+        load_points<d>(some, xi);
+        evaluate_rule<E, recipe, columns>(line, differences, rest, xi, f);
         store_points<columns>(f, results);
         std::copy_n(results, std::min<Index>(stage.first[run + 1] - p, lanes) * columns, out);
       }

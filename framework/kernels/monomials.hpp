@@ -73,7 +73,8 @@ enum class Factor : std::uint8_t {
 /// their exponents.
 template <MonomialElement E, Factor factor>
 struct ProductMonomials {
-  static constexpr int dim = E::dim;
+  using element = E;
+  static constexpr int dim = num_variables<E>;
   static constexpr int num_shape = static_cast<int>(E::shape_monomials.size());
 
   /// Whether the shape functions are multiplied with their monomial n.
@@ -118,14 +119,7 @@ struct ProductMonomials {
       if (product(m, 0) == place) return m;
     return -1;
   }
-  /// Whether Σ_i B_ni (X_i − X_0) may be other than zero for a factor n: for n = 0 unless the monomial 1 is node 0's
-  /// alone.
-  static constexpr bool moves(int n) {
-    for (std::size_t i = 0; i < E::num_nodes; ++i)
-      if (E::shape_coefficients[static_cast<std::size_t>(n)][i] != 0 && i > 0) return multiplies(n);
-    return false;
-  }
-  /// Pairs of a monomial m of the shape functions and a factor n that moves() whose product is at a place.
+  /// Pairs of a monomial m of the shape functions and a factor n > 0 whose product is at a place.
   struct Pair {
     int m, n;
   };
@@ -154,7 +148,7 @@ struct ProductMonomials {
     std::array<int, static_cast<std::size_t>(num_shape) * num_shape> places{};
     for (int m = 0; m < num_shape; ++m)
       for (int n = 0; n < num_shape; ++n)
-        places[static_cast<std::size_t>(m * num_shape + n)] = moves(n) ? product(m, n) : -1;
+        places[static_cast<std::size_t>(m * num_shape + n)] = n > 0 && multiplies(n) ? product(m, n) : -1;
     Pairs result;
     int count = 0;
     for (int place = 0; place < size; ++place) {

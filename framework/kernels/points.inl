@@ -56,7 +56,7 @@ class Spread {
     if constexpr (single) return four;
   }
 
-  // The d coordinates (variables of the element) of num_points points, of which `local` is the first; reads a whole
+  // ξ_1 … ξ_d of num_points points, of which `local` is the first; reads a whole
   // vector.
   HWY_INLINE void coordinates(const T* local, W* xi) const {
     if constexpr (single) {
@@ -163,17 +163,59 @@ HWY_INLINE void evaluate_points(const PointStage<T>& stage, const Spread<T, d>& 
   }
 }
 
-// The points of runs whose coefficients, spread over lanes, stand `stride` apart.
+// The rational function of an element, lane by lane.
+template <RationalElement E, class V>
+HWY_INLINE V rational_function(const V* xi) {
+  const hn::DFromV<V> tag;
+  using T = hn::TFromD<hn::DFromV<V>>;
+  V affine[3];
+  unrolled<3>([&](auto i) HALFGRAD_LAMBDA {
+    affine[i()] = hn::Set(tag, static_cast<T>(E::rational[i()][0]));
+    unrolled<E::dim>([&](auto k) HALFGRAD_LAMBDA {
+      constexpr auto factor = static_cast<T>(E::rational[i()][k() + 1]);
+      if constexpr (factor != 0) affine[i()] = hn::MulAdd(hn::Set(tag, factor), xi[k()], affine[i()]);
+    });
+  });
+  return hn::IfThenElseZero(hn::Gt(affine[2], hn::Set(tag, static_cast<T>(E::least_denominator))),
+                            hn::Div(hn::Mul(affine[0], affine[1]), affine[2]));
+}
+
+// A polynomial at points by their ξ.
 template <class Monomials, class T>
-HWY_INLINE void evaluate_polynomials(const PointStage<T>& stage, const Spread<T, Monomials::dim>& spread, Index begin,
-                                     Index end, const T* coefficients, int stride, Index num_whole) {
+HWY_INLINE Wide<T> polynomial(const Wide<T>* c, const Wide<T>* xi) {
+  if constexpr (requires { typename Monomials::element; }) {
+    using E = typename Monomials::element;
+    if constexpr (RationalElement<E>) {
+      Wide<T> eta[E::dim + 1];
+      HALFGRAD_UNROLL
+      for (int k = 0; k < E::dim; ++k) eta[k] = xi[k];
+      HALFGRAD_UNROLL
+      for (int p = 0; p < Wide<T>::num_parts; ++p) {
+        typename Wide<T>::V part[E::dim];
+        HALFGRAD_UNROLL
+        for (int k = 0; k < E::dim; ++k) part[k] = xi[k].part[p];
+        eta[E::dim].part[p] = rational_function<E>(part);
+      }
+      return horner<Monomials, 0>(c, eta);
+    } else {
+      return horner<Monomials, 0>(c, xi);
+    }
+  } else {
+    return horner<Monomials, 0>(c, xi);
+  }
+}
+
+// The points of runs whose coefficients, spread over lanes, stand `stride` apart.
+template <class Monomials, int d, class T>
+HWY_INLINE void evaluate_polynomials(const PointStage<T>& stage, const Spread<T, d>& spread, Index begin, Index end,
+                                     const T* coefficients, int stride, Index num_whole) {
   for (Index run = begin; run < end; ++run, coefficients += stride) {
     // Loaded before the points, whose stores may be to any memory for all that the compiler knows.
     Wide<T> c[Monomials::size];
     HALFGRAD_UNROLL
-    for (int i = 0; i < Monomials::size; ++i) c[i] = Wide<T>::load(coefficients + Spread<T, Monomials::dim>::size * i);
-    evaluate_points<Monomials::dim>(stage, spread, run, num_whole,
-                                    [&](const Wide<T>* xi) HALFGRAD_LAMBDA { return horner<Monomials, 0>(c, xi); });
+    for (int i = 0; i < Monomials::size; ++i) c[i] = Wide<T>::load(coefficients + Spread<T, d>::size * i);
+    evaluate_points<d>(stage, spread, run, num_whole,
+                       [&](const Wide<T>* xi) HALFGRAD_LAMBDA { return polynomial<Monomials, T>(c, xi); });
   }
 }
 

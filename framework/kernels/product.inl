@@ -18,10 +18,13 @@ namespace halfgrad::kernels::HWY_NAMESPACE {
 template <class E, int m, int stride, class Item, std::size_t... i>
 HWY_INLINE Item combination(const Item* items, Item sum, std::index_sequence<i...>) {
   const auto add = [&]<std::size_t node>() HALFGRAD_LAMBDA {
-    constexpr int factor = E::shape_coefficients[m][node];
-    if constexpr (factor == 1) sum = sum + items[node * stride];
-    if constexpr (factor == -1) sum = sum - items[node * stride];
-    static_assert(factor >= -1 && factor <= 1);
+    constexpr auto factor = static_cast<HALFGRAD_SCALAR>(E::shape_coefficients[m][node]);
+    if constexpr (factor == 1)
+      sum = sum + items[node * stride];
+    else if constexpr (factor == -1)
+      sum = sum - items[node * stride];
+    else if constexpr (factor != 0)
+      sum = sum + items[node * stride] * factor;
   };
   (add.template operator()<i>(), ...);
   return sum;
@@ -58,13 +61,14 @@ HWY_INLINE void set_up_blend(const Spread<T, E::dim>& spread, const T* const* li
       moved[i] = moved[i].minus(h[a][i], rest[i * d + a]);
     }
   }
+  // Y of the monomial 1 is zero.
   T y[M::num_shape][d];
   F g[M::num_shape][d];
   unrolled<M::num_shape>([&](auto m) HALFGRAD_LAMBDA {
     HALFGRAD_UNROLL
     for (int a = 0; a < d; ++a) {
       g[m()][a] = combination<E, m()>(h[a], F::zero());
-      if constexpr (M::moves(m())) y[m()][a] = combination<E, m(), d>(rest + a, T(0));
+      if constexpr (m() > 0 && M::multiplies(m())) y[m()][a] = combination<E, m(), d>(rest + a, T(0));
     }
   });
   // A coefficient at a time, so that its sum stays in a register.
