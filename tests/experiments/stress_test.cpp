@@ -111,9 +111,9 @@ TEST(Stress, RefusesOptionsThatMakeNoSense) {
 // was.
 TEST(Stress, MeshesThatFailedOnceHold) {
   const std::pair<const char*, std::uint64_t> failed[] = {
-      {"segment", 496},      {"segment", 2278},      {"triangle", 944},    {"triangle", 4679},
-      {"triangle", 4858},    {"quadrilateral", 994}, {"tetrahedron", 955}, {"tetrahedron", 9037},
-      {"tetrahedron", 9234}, {"mixed", 225},         {"mixed", 694},       {"mixed", 8181}};
+      {"segment", 496},       {"segment", 2278},    {"triangle", 944},     {"triangle", 4679},    {"triangle", 4858},
+      {"quadrilateral", 994}, {"tetrahedron", 955}, {"tetrahedron", 9037}, {"tetrahedron", 9234}, {"pyramid", 1461},
+      {"pyramid", 1871},      {"mixed", 225},       {"mixed", 694},        {"mixed", 1626},       {"mixed", 8181}};
   for (const auto& [element, seed] : failed)
     EXPECT_TRUE(
         run_stress({.seed = seed, .num_cases = 1, .minutes = 0, .elements = {element}, .progress = {}}).passed())
