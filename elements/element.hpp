@@ -65,9 +65,9 @@ concept Element = requires(const ReferencePoint<E>& xi) {
 
 /// An element with a rational function of ξ beside the polynomials:
 ///
-/// rational             three affine functions n_1, n_2, m as coefficients of 1, ξ_1, … ξ_dim; the function is n_1 n_2
-/// / m
-///                      where m > least_denominator, else 0
+/// rational             three affine functions n_1, n_2, m, each as coefficients of 1, ξ_1, … ξ_dim; the function is
+///                      n_1 n_2 / m where m > least_denominator, else 0
+/// least_denominator    see rational
 template <class E>
 concept RationalElement = Element<E> && requires {
   { E::rational[2][E::dim] } -> std::convertible_to<double>;

@@ -100,12 +100,11 @@ HWY_INLINE void evaluate_rule(const T* const* line, const T* differences, const 
       along[k] = hn::Mul(weight, offset[k]);
       if constexpr (recipe == Recipe::hermite) along[k] = hn::MulAdd(beta[i], moment[k], along[k]);
     }
-    HALFGRAD_UNROLL
-    for (int c = 0; c < columns; ++c) f[c] = hn::MulAdd(weight, hn::Set(tag, differences[4 * i + c]), f[c]);
     const auto add = [&](const V& factor, const T* four) HALFGRAD_LAMBDA {
       HALFGRAD_UNROLL
       for (int c = 0; c < columns; ++c) f[c] = hn::MulAdd(factor, hn::Set(tag, four[c]), f[c]);
     };
+    add(weight, differences + 4 * i);
     const T* four = line[i] + 4;
     HALFGRAD_UNROLL
     for (int k = 0; k < d; ++k, four += 4) add(along[k], four);
@@ -123,6 +122,7 @@ template <class E, Recipe recipe, int columns, class T>
 HWY_NOINLINE void evaluate_lanes(const PointStage<T>& stage, Index begin, Index end) {
   constexpr int n = E::num_nodes, d = E::dim, lanes = static_cast<int>(hn::MaxLanes(LaneTag<T>()));
   const Index last = stage.first[end];
+  HWY_ALIGN T some[d * lanes] = {}, results[columns * lanes];
   for (Index run = begin; run < end; ++run) {
     const T* line[n];
     find_lines<n, 4 * (1 + num_weights(recipe, d))>(stage, run, line);
@@ -132,22 +132,16 @@ HWY_NOINLINE void evaluate_lanes(const PointStage<T>& stage, Index begin, Index 
     for (int i = 0; i < n; ++i) (Four<T>::load(line[i]) - first_node).store(differences + 4 * i);
     const T* const rest = stage.rest + static_cast<Offset>(run) * n * d;
     for (Index p = stage.first[run]; p < stage.first[run + 1]; p += lanes) {
-      const T* local = stage.local + static_cast<Offset>(p) * d;
+      const T* const local = stage.local + static_cast<Offset>(p) * d;
       T* const out = stage.out + static_cast<Offset>(p) * columns;
-      LaneVector<T> xi[d], f[columns];
       // Vectors are read and stored whole: the next run overwrites what was stored too much, except at the range's end.
-      if (p + lanes <= last) {
-        load_points<d>(local, xi);
-        evaluate_rule<E, recipe, columns>(line, differences, rest, xi, f);
-        store_points<columns>(f, out);
-      } else {
-        HWY_ALIGN T some[d * lanes] = {}, results[columns * lanes];
-        std::copy_n(local, (last - p) * d, some);
-        load_points<d>(some, xi);
-        evaluate_rule<E, recipe, columns>(line, differences, rest, xi, f);
-        store_points<columns>(f, results);
-        std::copy_n(results, std::min<Index>(stage.first[run + 1] - p, lanes) * columns, out);
-      }
+      const bool whole = p + lanes <= last;
+      if (!whole) std::copy_n(local, (last - p) * d, some);
+      LaneVector<T> xi[d], f[columns];
+      load_points<d>(whole ? local : some, xi);
+      evaluate_rule<E, recipe, columns>(line, differences, rest, xi, f);
+      store_points<columns>(f, whole ? out : results);
+      if (!whole) std::copy_n(results, std::min<Index>(stage.first[run + 1] - p, lanes) * columns, out);
     }
   }
 }

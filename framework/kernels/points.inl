@@ -180,28 +180,27 @@ HWY_INLINE V rational_function(const V* xi) {
                             hn::Div(hn::Mul(affine[0], affine[1]), affine[2]));
 }
 
+template <class Monomials>
+concept RationalMonomials = RationalElement<typename Monomials::element>;
+
 // A polynomial at points by their ξ.
 template <class Monomials, class T>
 HWY_INLINE Wide<T> polynomial(const Wide<T>* c, const Wide<T>* xi) {
-  if constexpr (requires { typename Monomials::element; }) {
-    using E = typename Monomials::element;
-    if constexpr (RationalElement<E>) {
-      Wide<T> eta[E::dim + 1];
-      HALFGRAD_UNROLL
-      for (int k = 0; k < E::dim; ++k) eta[k] = xi[k];
-      HALFGRAD_UNROLL
-      for (int p = 0; p < Wide<T>::num_parts; ++p) {
-        typename Wide<T>::V part[E::dim];
-        HALFGRAD_UNROLL
-        for (int k = 0; k < E::dim; ++k) part[k] = xi[k].part[p];
-        eta[E::dim].part[p] = rational_function<E>(part);
-      }
-      return horner<Monomials, 0>(c, eta);
-    } else {
-      return horner<Monomials, 0>(c, xi);
-    }
-  } else {
+  if constexpr (!RationalMonomials<Monomials>) {
     return horner<Monomials, 0>(c, xi);
+  } else {
+    using E = typename Monomials::element;
+    Wide<T> eta[E::dim + 1];
+    HALFGRAD_UNROLL
+    for (int k = 0; k < E::dim; ++k) eta[k] = xi[k];
+    HALFGRAD_UNROLL
+    for (int p = 0; p < Wide<T>::num_parts; ++p) {
+      typename Wide<T>::V part[E::dim];
+      HALFGRAD_UNROLL
+      for (int k = 0; k < E::dim; ++k) part[k] = xi[k].part[p];
+      eta[E::dim].part[p] = rational_function<E>(part);
+    }
+    return horner<Monomials, 0>(c, eta);
   }
 }
 
