@@ -104,20 +104,23 @@ void run(const std::string& name, int rounds, std::int64_t max_points, int threa
   auto near_tenth = bound(float(), "phong", select_points(embedding, sorted.first(every_tenth.size())));
   auto sparse_tenth = bound(float(), "phong", select_points(embedding, every_tenth));
   // What the stencils of other reconstructors cost.
-  const auto bound_with = [&](const VertexGradientReconstructor& reconstructor, const char* rule) {
-    const Reconstruction own = reconstructor.reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+  const auto reconstructed = [&](const VertexGradientReconstructor& reconstructor) {
+    return reconstructor.reconstruct(CellGradients(mesh), active_vertices(mesh, embedding));
+  };
+  const auto bound_with = [&](const Reconstruction& own, const char* rule) {
     return Frame<float>{Interpolant<float>(mesh, embedding, named_rule(rule), &own), {}, {}};
   };
-  auto phong_lean = bound_with(Kriging({.patch = KrigingPatch::lean}), "phong");
-  auto phong_kriging = bound_with(Kriging(), "phong"), phong_adaptive = bound_with(Adaptive(), "phong");
+  const Reconstruction cubic = reconstructed(Kriging({.drift = KrigingDrift::cubic}));
+  auto phong_lean = bound_with(reconstructed(Kriging({.patch = KrigingPatch::lean})), "phong");
+  auto phong_kriging = bound_with(reconstructed(Kriging()), "phong");
+  auto phong_kriging_cubic = bound_with(cubic, "phong"), dual_taylor_kriging = bound_with(cubic, "dual_taylor");
+  auto phong_adaptive = bound_with(reconstructed(Adaptive()), "phong");
+  auto hermite = bound_with(reconstruction, "hermite");
   // Hessians of no meaning on the same stencils: what dual_taylor costs next to phong.
   Reconstruction with_hessians = reconstruction;
   with_hessians.stencils.hessian_weights.assign(
       static_cast<std::size_t>(num_symmetric(mesh.gdim()) * reconstruction.stencils.num_entries()), 0);
-  Frame<float> hermite = bound(float(), "hermite", embedding);
-  Frame<float> dual_taylor{Interpolant<float>(mesh, embedding, named_rule("dual_taylor"), &with_hessians), {}, {}};
-  Frame<float> dual_taylor_kriging = bound_with(Kriging({.drift = KrigingDrift::cubic}), "dual_taylor");
-  Frame<float> phong_kriging_cubic = bound_with(Kriging({.drift = KrigingDrift::cubic}), "phong");
+  auto dual_taylor = bound_with(with_hessians, "dual_taylor");
   const Values<float> values = workload.deformed.cast<float>();
   MovingTenth moving(mesh.vertices(), values);
 
