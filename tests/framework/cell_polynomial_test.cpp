@@ -81,6 +81,15 @@ double largest_difference(const Values<Scalar>& result, const Values<double>& ex
   return largest;
 }
 
+template <class Scalar>
+Values<double> plain_result(const Interpolant<double>& reference, const Values<Scalar>& values,
+                            const Values<Scalar>& gradients, const Values<Scalar>& hessians) {
+  Values<double> result;
+  reference.evaluate_given(values.template cast<double>(), gradients.template cast<double>(),
+                           hessians.template cast<double>(), result, {.kernel = Kernel::plain});
+  return result;
+}
+
 template <Element E, class Scalar>
 void expect_fast_equals_plain(double jitter = 0.2, int cells = 3) {
   const Mesh mesh = test::lattice<E>(cells, jitter, 5);
@@ -105,9 +114,7 @@ void expect_fast_equals_plain(double jitter = 0.2, int cells = 3) {
       const double rounding = 2 * std::max(1.0, terms / 40.0);
       // Polynomials in a rational function have its rounding besides, times a sum of four values.
       const double of_variables = RationalElement<E> ? 1.5 : 1;
-      Values<double> expected;
-      reference.evaluate_given(values.template cast<double>(), gradients.template cast<double>(),
-                               hessians.template cast<double>(), expected, {.kernel = Kernel::plain});
+      Values<double> expected = plain_result(reference, values, gradients, hessians);
       on_every_target([&] {
         Values<Scalar> result;
         fast.evaluate_given(values, gradients, hessians, result);
@@ -229,9 +236,7 @@ void expect_weighted_equals_plain(int gdim) {
       const Values<Scalar> gradients = random_values(num_active, columns * gdim, 2).template cast<Scalar>();
       const Values<Scalar> hessians =
           random_values(num_active, columns * num_symmetric(gdim), 3).template cast<Scalar>();
-      Values<double> expected;
-      reference.evaluate_given(values.template cast<double>(), gradients.template cast<double>(),
-                               hessians.template cast<double>(), expected, {.kernel = Kernel::plain});
+      const Values<double> expected = plain_result(reference, values, gradients, hessians);
       on_every_target([&] {
         Values<Scalar> result;
         interpolant.evaluate_given(values, gradients, hessians, result);
