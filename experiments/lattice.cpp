@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "experiments/random.hpp"
+#include "framework/cell_map.hpp"
 #include "framework/error.hpp"
 #include "framework/json_reader.hpp"
 
@@ -393,8 +394,7 @@ Mesh make_lattice(const LatticeOptions& options) {
       for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
         NodeMatrix<E> positions;
         for (int i = 0; i < E::num_nodes; ++i) positions.row(i) = vertices.row(block.cells(c, i));
-        const auto jacobian = (positions.transpose() * E::shape_gradient(E::center())).eval();
-        if (jacobian.determinant() < 0) std::swap(block.cells(c, 0), block.cells(c, 1));
+        if (cell_jacobian<E>(positions, E::center()).determinant() < 0) std::swap(block.cells(c, 0), block.cells(c, 1));
       }
     blocks.push_back(std::move(block));
   });

@@ -10,6 +10,7 @@
 #include "experiments/mesh_source.hpp"
 #include "experiments/random.hpp"
 #include "experiments/tessellation.hpp"
+#include "framework/cell_map.hpp"
 #include "framework/embedding.hpp"
 #include "framework/error.hpp"
 #include "framework/io/point_set.hpp"
@@ -27,7 +28,7 @@ Points random_points(const Mesh& mesh, Index count, std::uint64_t seed) {
   for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
     for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
       const auto positions = node_positions(mesh, block, c);
-      total += std::abs((positions.transpose() * E::shape_gradient(E::center())).determinant()) * E::reference_volume;
+      total += std::abs(cell_jacobian<E>(positions, E::center()).determinant()) * E::reference_volume;
       cumulative.push_back(total);
     }
   });

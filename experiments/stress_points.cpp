@@ -5,6 +5,7 @@
 #include <map>
 
 #include "framework/cell_extent.hpp"
+#include "framework/cell_map.hpp"
 #include "framework/error.hpp"
 #include "framework/inverse_map.hpp"
 
@@ -103,11 +104,11 @@ class PointMaker {
   void seek_inside(Index cell, bool at_vertex) {
     with_cell(mesh_, cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
       const NodeMatrix<E> positions = node_positions(mesh_, block, row);
-      const NodeMatrix<E> edges = positions.rowwise() - positions.row(0);
-      const ReferencePoint<E> xi = random_local<E>(random_);
-      const Vector inside = positions.row(0).transpose() + edges.transpose() * E::shape(xi);
+      const NodeMatrix<E> edges = from_first_node<E>(positions);
+      ReferencePoint<E> inside = cell_position<E>(edges, random_local<E>(random_));
+      for (int a = 0; a < E::dim; ++a) inside[a] += positions(0, a);
       const InverseMap<E> map(positions);
-      positions_.push_back(at_vertex ? Vector(positions.row(E::num_nodes - 1).transpose()) : inside);
+      positions_.push_back(at_vertex ? Vector(positions.row(E::num_nodes - 1).transpose()) : Vector(inside));
       result_.in_cell.push_back(!map.degenerate() && map.affine());
     });
   }
@@ -161,9 +162,8 @@ std::vector<char> usable_cells(const Mesh& mesh) {
   for_each_block(mesh, [&]<Element E>(const ElementBlock<E>& block, Index) {
     for (Eigen::Index c = 0; c < block.cells.rows(); ++c) {
       const NodeMatrix<E> positions = node_positions(mesh, block, c);
-      const NodeMatrix<E> edges = positions.rowwise() - positions.row(0);
-      const auto jacobian = (edges.transpose() * E::shape_gradient(E::center())).eval();
-      usable.push_back(!is_degenerate<E>(cell_extent<E>(edges), jacobian.determinant()));
+      const NodeMatrix<E> edges = from_first_node<E>(positions);
+      usable.push_back(!is_degenerate<E>(cell_extent<E>(edges), cell_jacobian<E>(edges, E::center()).determinant()));
     }
   });
   return usable;

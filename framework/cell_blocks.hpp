@@ -98,13 +98,18 @@ WeightedPoints embed(const CellBlocks<Es...>& cells, const Points& points, const
       const InverseMap<E> map(positions);
       if (map.degenerate()) continue;
       const ReferencePoint<E> growth = E::num_nodes * options.tolerance * cell_extent<E>(positions);
-      const ReferencePoint<E> low = positions.colwise().minCoeff().transpose() - growth,
-                              high = positions.colwise().maxCoeff().transpose() + growth;
+      ReferencePoint<E> low, high;
+      for (int a = 0; a < E::dim; ++a) {
+        low[a] = positions.col(a).minCoeff() - growth[a];
+        high[a] = positions.col(a).maxCoeff() + growth[a];
+      }
       auto at = std::lower_bound(order.begin(), order.end(), low[0],
                                  [&](Index p, double bound) { return points(p, 0) < bound; });
       for (; at != order.end() && points(*at, 0) <= high[0]; ++at) {
         const ReferencePoint<E> position = points.row(*at).transpose();
-        if ((position.array() < low.array()).any() || (position.array() > high.array()).any()) continue;
+        bool near = true;
+        for (int a = 0; a < E::dim; ++a) near &= position[a] >= low[a] && position[a] <= high[a];
+        if (!near) continue;
         const InverseMapResult<E> result = map(position);
         if (!result.converged) continue;
         Claim& claim = claims[*at];

@@ -13,7 +13,9 @@ namespace halfgrad {
 /// Extent of a cell's nodes (num_nodes × dim) along each axis, dim × 1.
 template <Element E>
 ReferencePoint<E> cell_extent(const NodeMatrix<E>& positions) {
-  return (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).transpose();
+  ReferencePoint<E> extent;
+  for (int a = 0; a < E::dim; ++a) extent[a] = positions.col(a).maxCoeff() - positions.col(a).minCoeff();
+  return extent;
 }
 
 /// The one definition of a cell without volume, for reports, gradients and locations alike: at the element's center

@@ -48,7 +48,7 @@ bool CellGradients::on_boundary(Index vertex) const {
 Vector CellGradients::centroid(Index cell) const {
   if (table_ != nullptr) return table_->gradients[cell].centroid;
   return with_cell(*mesh_, cell, [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
-    return Vector(node_positions(*mesh_, block, row).transpose() * E::shape(E::center()));
+    return Vector(cell_position<E>(node_positions(*mesh_, block, row), E::center()));
   });
 }
 

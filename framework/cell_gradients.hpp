@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "framework/cell_extent.hpp"
+#include "framework/cell_map.hpp"
 #include "framework/mesh.hpp"
 #include "framework/refined_inverse.hpp"
 
@@ -30,19 +31,19 @@ struct CellTable {
 /// Geometry of one cell of type E by its node positions.
 template <Element E>
 CellGradient cell_gradient(const NodeMatrix<E>& positions) {
-  const NodeMatrix<E> derivative = E::shape_gradient(E::center());
   CellGradient result;
-  // Differences to the first node keep the digits of cells far from the origin.
-  const NodeMatrix<E> edges = positions.rowwise() - positions.row(0);
-  result.centroid = (edges.transpose() * E::shape(E::center())) + positions.row(0).transpose();
-  const Eigen::Matrix<double, E::dim, E::dim> jacobian = edges.transpose() * derivative;
+  const NodeMatrix<E> edges = from_first_node<E>(positions);
+  ReferencePoint<E> centroid = cell_position<E>(edges, E::center());
+  for (int a = 0; a < E::dim; ++a) centroid[a] += positions(0, a);
+  result.centroid = centroid;
+  const Eigen::Matrix<double, E::dim, E::dim> jacobian = cell_jacobian<E>(edges, E::center());
   const double determinant = jacobian.determinant();
   if (is_degenerate<E>(cell_extent<E>(edges), determinant)) {
     result.weights = NodeRows::Zero(E::num_nodes, E::dim);
     return result;
   }
   result.volume = std::abs(determinant) * E::reference_volume;
-  result.weights = derivative * refined_inverse<E::dim>(jacobian);
+  result.weights = times_matrix<E>(E::shape_gradient(E::center()), refined_inverse<E::dim>(jacobian));
   return result;
 }
 

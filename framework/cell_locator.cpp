@@ -100,7 +100,7 @@ CellStatistics<D> cell_statistics(const Mesh& mesh, double tolerance) {
     const Eigen::Index stride = std::max<Eigen::Index>(1, block.cells.rows() / 4096);
     for (Eigen::Index c = 0; c < block.cells.rows(); c += stride) {
       const auto positions = node_positions(mesh, block, c);
-      result.mean_extent += (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).transpose();
+      result.mean_extent += cell_extent<E>(positions);
       ++num_sampled;
     }
   });
@@ -320,8 +320,15 @@ WeightPlanes<E::dim> weight_planes(const NodeMatrix<E>& gradient, const NodeMatr
 // which a cell far from the origin may be thin.
 template <Element E>
 double weight_blur(const NodeMatrix<E>& gradient, const NodeMatrix<E>& positions) {
-  const ReferencePoint<E> blur = 32 * cell_extent<E>(positions) + positions.cwiseAbs().colwise().maxCoeff().transpose();
-  return std::numeric_limits<double>::epsilon() * (gradient.cwiseAbs() * blur).maxCoeff();
+  ReferencePoint<E> blur = 32 * cell_extent<E>(positions);
+  for (int a = 0; a < E::dim; ++a) blur[a] += positions.col(a).cwiseAbs().maxCoeff();
+  double greatest = 0;
+  for (int i = 0; i < E::num_nodes; ++i) {
+    double sum = 0;
+    for (int a = 0; a < E::dim; ++a) sum += std::abs(gradient(i, a)) * blur[a];
+    greatest = std::max(greatest, sum);
+  }
+  return std::numeric_limits<double>::epsilon() * greatest;
 }
 
 // An affine cell ready for tests. Flattened: small fixed-size products that are not inlined cost more than they

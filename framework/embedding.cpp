@@ -59,10 +59,7 @@ Extrapolation<E> extrapolate(const InverseMap<E>& map, const ReferencePoint<E>& 
     const double determinant = jacobian.determinant();
     if (inward < 1 && !(std::abs(determinant) > 1e-8 * jacobian.colwise().norm().cwiseMax(column_norms).prod()))
       continue;
-    const Eigen::FullPivLU<Eigen::Matrix<double, E::dim, E::dim>> solver(jacobian);
-    ReferencePoint<E> offset = solver.solve(map.difference(position, xi));
-    offset += solver.solve(map.difference(position, xi) - jacobian * offset);
-    return {xi, offset};
+    return {xi, solve_by_elimination(jacobian, map.difference(position, xi))};
   }
   return {closest, ReferencePoint<E>::Zero()};
 }

@@ -1,11 +1,15 @@
 // The inverse map X → ξ of one cell: closed form where x(ξ) is affine, a safeguarded Newton iteration elsewhere.
+// Plain loops for what cell_map.hpp says.
 #pragma once
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 #include <vector>
 
 #include "framework/cell_extent.hpp"
+#include "framework/cell_map.hpp"
+#include "framework/types.hpp"
 
 namespace halfgrad {
 
@@ -17,6 +21,9 @@ struct InverseMapResult {
   bool converged = false;  ///< |x(ξ) − X| ≤ 1e-12 of the cell's extent, axis by axis
 };
 
+/// A⁻¹ b by elimination with full pivoting and a step of refinement.
+Vector solve_by_elimination(const SmallMatrix& matrix, const Vector& vector);
+
 /// The inverse map of a cell by its node positions. Works relative to the first node and in units of the cell's extent
 /// along each axis (powers of two, so that scaling is exact): neither offset, scale nor stretching along the axes costs
 /// digits.
@@ -27,23 +34,21 @@ class InverseMap {
   using Jacobian = Eigen::Matrix<double, E::dim, E::dim>;
 
   /// `positions`: num_nodes × dim.
-  explicit InverseMap(const NodeMatrix<E>& positions) : origin_(positions.row(0).transpose()) {
-    nodes_ = positions.rowwise() - positions.row(0);
-    Point extent = cell_extent<E>(nodes_);
+  explicit InverseMap(const NodeMatrix<E>& positions) {
+    Point extent = cell_extent<E>(positions);
     for (int a = 0; a < E::dim; ++a) {
+      origin_[a] = positions(0, a);
       scale_[a] = unit_scale(extent[a]);
       extent[a] *= scale_[a];
-      nodes_.col(a) *= scale_[a];
+      for (int i = 0; i < E::num_nodes; ++i) nodes_(i, a) = (positions(i, a) - origin_[a]) * scale_[a];
     }
-    const Jacobian jacobian = nodes_.transpose() * E::shape_gradient(E::center());
+    const Jacobian jacobian = scaled_jacobian(E::center());
     determinant_ = jacobian.determinant();
     degenerate_ = is_degenerate<E>(extent, determinant_);
     if (degenerate_) return;
     inverse_ = jacobian.inverse();
-    const NodeMatrix<E> reference = E::nodes();
     if constexpr (!E::affine) {
-      const NodeMatrix<E> image = (reference.rowwise() - reference.row(0)) * jacobian.transpose();
-      affine_ = (image - nodes_).cwiseAbs().maxCoeff() <= 1e-14;
+      affine_ = is_image(jacobian);
       if (!affine_) measure_distortion();
     }
   }
@@ -55,12 +60,24 @@ class InverseMap {
   /// Whether x(ξ) is affine on this cell.
   bool affine() const { return affine_; }
   /// β = shape(ξ(X)) is linear in X: ∂β_i/∂X_a, num_nodes × dim, of the affine part at the center.
-  NodeMatrix<E> weight_gradient() const { return E::shape_gradient(E::center()) * inverse_ * scale_.asDiagonal(); }
+  NodeMatrix<E> weight_gradient() const {
+    NodeMatrix<E> result = times_matrix<E>(E::shape_gradient(E::center()), inverse_);
+    for (int a = 0; a < E::dim; ++a) result.col(a) *= scale_[a];
+    return result;
+  }
   /// ∂x/∂ξ in length units, dim × dim.
-  Jacobian jacobian(const Point& xi) const { return scale_.cwiseInverse().asDiagonal() * scaled_jacobian(xi); }
+  Jacobian jacobian(const Point& xi) const {
+    Jacobian result = scaled_jacobian(xi);
+    for (int a = 0; a < E::dim; ++a)
+      for (int k = 0; k < E::dim; ++k) result(a, k) /= scale_[a];
+    return result;
+  }
   /// X − x(ξ), dim × 1, in length units.
   Point difference(const Point& position, const Point& xi) const {
-    return (scaled(position) - image(xi)).cwiseQuotient(scale_);
+    const Point target = scaled(position), at = image(xi);
+    Point result;
+    for (int a = 0; a < E::dim; ++a) result[a] = (target[a] - at[a]) / scale_[a];
+    return result;
   }
 
   /// True where the linear part alone shows that the position lies outside the cell grown by `eps`.
@@ -72,60 +89,107 @@ class InverseMap {
   /// ξ of a position.
   InverseMapResult<E> operator()(const Point& position) const {
     const Point target = scaled(position);
-    if (affine_) return solve_affine(target);
-    const InverseMapResult<E> result = newton(target, clamped(affine_guess(target)));
-    return settles(result) ? result : search(target, result);
+    if constexpr (!E::affine) {
+      if (!affine_) {
+        const InverseMapResult<E> result = newton(target, clamped(affine_guess(target)));
+        return settles(result) ? result : search(target, result);
+      }
+    }
+    return solve_affine(target);
   }
 
  private:
   static constexpr double tolerance = 1e-12;
   static constexpr double hair = 1e-6;  // of the reference cell
 
-  Point scaled(const Point& position) const { return (position - origin_).cwiseProduct(scale_); }
-  Point image(const Point& xi) const { return nodes_.transpose() * E::shape(xi); }
-  Jacobian scaled_jacobian(const Point& xi) const { return nodes_.transpose() * E::shape_gradient(xi); }
-  Point affine_guess(const Point& target) const { return E::center() + inverse_ * (target - image(E::center())); }
-  static Point clamped(const Point& xi) {
+  Point scaled(const Point& position) const {
+    Point result;
+    for (int a = 0; a < E::dim; ++a) result[a] = (position[a] - origin_[a]) * scale_[a];
+    return result;
+  }
+  static Point product(const Jacobian& matrix, const Point& vector) {
+    Point result;
+    for (int a = 0; a < E::dim; ++a) {
+      double sum = 0;
+      for (int k = 0; k < E::dim; ++k) sum += matrix(a, k) * vector[k];
+      result[a] = sum;
+    }
+    return result;
+  }
+  Point image(const Point& xi) const { return cell_position<E>(nodes_, xi); }
+  Jacobian scaled_jacobian(const Point& xi) const { return cell_jacobian<E>(nodes_, xi); }
+  Point affine_guess(const Point& target) const {
+    const Point from_center = target - image(E::center());
+    return E::center() + product(inverse_, from_center);
+  }
+  static Point clamped(Point xi) {
     const NodeMatrix<E> nodes = E::nodes();
-    return xi.cwiseMax(nodes.colwise().minCoeff().transpose()).cwiseMin(nodes.colwise().maxCoeff().transpose());
+    for (int a = 0; a < E::dim; ++a) xi[a] = std::clamp(xi[a], nodes.col(a).minCoeff(), nodes.col(a).maxCoeff());
+    return xi;
+  }
+  // Of a residual, against the size of what it is a residual of.
+  static bool is_small(const Point& residual, double bound, const Point& target) {
+    return residual.cwiseAbs().maxCoeff() <= bound * std::max(1.0, target.norm());
+  }
+
+  // Whether the linear map from the first node takes the reference cell to the cell.
+  bool is_image(const Jacobian& jacobian) const {
+    const NodeMatrix<E> reference = E::nodes();
+    double largest = 0;
+    for (int i = 0; i < E::num_nodes; ++i)
+      for (int a = 0; a < E::dim; ++a) {
+        double sum = -nodes_(i, a);
+        for (int k = 0; k < E::dim; ++k) sum += jacobian(a, k) * (reference(i, k) - reference(0, k));
+        largest = std::max(largest, std::abs(sum));
+      }
+    return largest <= 1e-14;
   }
 
   // How far the map is from its linear part: the columns of J are mean values of the columns at the nodes, so their
   // greatest deviation there bounds |J_c⁻¹ J − I| in the cell, and with it the distance of ξ from the affine guess.
   void measure_distortion() {
     const NodeMatrix<E> reference = E::nodes();
-    Eigen::Array<double, E::dim, 1> deviation = Eigen::Array<double, E::dim, 1>::Zero();
+    const Point center = E::center();
+    Point deviation = Point::Zero();  // squared, a column of J each
     double radius = 0, lowest = determinant_, highest = determinant_;
     for (int i = 0; i < E::num_nodes; ++i) {
-      const Point from_center = reference.row(i).transpose() - E::center();
-      radius = std::max(radius, from_center.norm());
-      // Just inside the node: rational shape functions may have no gradient at an apex.
-      const Jacobian at_node = scaled_jacobian(E::center() + 0.999999 * from_center);
+      Point near_node;
+      double squared = 0;
+      for (int k = 0; k < E::dim; ++k) {
+        const double from_center = reference(i, k) - center[k];
+        squared += from_center * from_center;
+        // Just inside the node: rational shape functions may have no gradient at an apex.
+        near_node[k] = center[k] + 0.999999 * from_center;
+      }
+      radius = std::max(radius, std::sqrt(squared));
+      const Jacobian at_node = scaled_jacobian(near_node);
       const double determinant = at_node.determinant();
       lowest = std::min(lowest, determinant);
       highest = std::max(highest, determinant);
-      deviation = deviation.max((inverse_ * at_node - Jacobian::Identity()).colwise().norm().transpose().array());
+      for (int k = 0; k < E::dim; ++k) {
+        Point column = product(inverse_, at_node.col(k));
+        column[k] -= 1;
+        deviation[k] = std::max(deviation[k], column.squaredNorm());
+      }
     }
-    distortion_ = deviation.matrix().norm();
+    distortion_ = std::sqrt(deviation.sum());
     // margin() measures along axes or barycentric directions: a factor of √dim covers both.
     deviation_ = std::sqrt(E::dim) * distortion_ * radius;
     one_signed_ = lowest > 0 || highest < 0;
   }
 
   InverseMapResult<E> solve_affine(const Point& target) const {
-    const Point first = E::nodes().row(0).transpose();
     const Jacobian jacobian = scaled_jacobian(E::center());
-    InverseMapResult<E> result;
-    Point from_first = inverse_ * target;
+    const auto residual = [&](const Point& from_first) -> Point { return target - product(jacobian, from_first); };
+    Point from_first = product(inverse_, target);
     // One step of refinement gives flat cells the residual that the inverse alone would not.
-    from_first += inverse_ * (target - jacobian * from_first);
+    from_first += product(inverse_, residual(from_first));
     // Where the inverse is worth nothing, on needles that are oblique to the axes, elimination with pivots is exact to
     // the rounding of the position.
-    if (!((target - jacobian * from_first).cwiseAbs().maxCoeff() <= 1e-14 * std::max(1.0, target.norm())))
-      from_first = jacobian.fullPivLu().solve(target);
-    result.xi = first + from_first;
-    result.converged = true;
-    return result;
+    if (!is_small(residual(from_first), 1e-14, target)) from_first = solve_by_elimination(jacobian, target);
+    const NodeMatrix<E> reference = E::nodes();
+    for (int k = 0; k < E::dim; ++k) from_first[k] += reference(0, k);
+    return {from_first, true};
   }
 
   // Newton with halved steps until the residual falls.
@@ -135,7 +199,7 @@ class InverseMap {
     double residual = difference.norm();
     const double floor = 4e-16 * std::max(1.0, target.norm());
     for (int iteration = 0; iteration < 60 && residual > floor; ++iteration) {
-      Point step = scaled_jacobian(result.xi).inverse() * difference;
+      Point step = product(scaled_jacobian(result.xi).inverse(), difference);
       const double length = step.norm();
       if (!std::isfinite(length)) break;
       if (length > 1) step /= length;
@@ -183,30 +247,47 @@ class InverseMap {
 
   // A part of the cell by its corners, a row each: ξ, and J_c⁻¹ (x(ξ) − X).
   static constexpr int num_corners = 1 << E::dim;
-  using Part = Eigen::Matrix<double, num_corners, 2 * E::dim>;
+  struct Part {
+    std::array<Point, num_corners> xi, image;
+  };
 
   Part whole(const Point& target) const {
     const NodeMatrix<E> nodes = E::nodes();
-    Part part = Part::Zero();
+    Part part{};
     for (int c = 0; c < num_corners; ++c) {
       if constexpr (CubeElement<E>) {
         const int node = E::cube_nodes[c];
-        part.row(c).template head<E::dim>() = nodes.row(node);
-        part.row(c).template tail<E::dim>() = (inverse_ * (nodes_.row(node).transpose() - target)).transpose();
+        Point from_target;
+        for (int a = 0; a < E::dim; ++a) {
+          part.xi[c][a] = nodes(node, a);
+          from_target[a] = nodes_(node, a) - target[a];
+        }
+        part.image[c] = product(inverse_, from_target);
       } else {
-        for (int a = 0; a < E::dim; ++a) part(c, a) = c >> a & 1 ? nodes.col(a).maxCoeff() : nodes.col(a).minCoeff();
+        for (int a = 0; a < E::dim; ++a) part.xi[c][a] = c >> a & 1 ? nodes.col(a).maxCoeff() : nodes.col(a).minCoeff();
       }
     }
     return part;
   }
 
-  // Whether a plane across an axis has the images of all corners on one side, and the position on the other.
-  static bool excludes(const Part& part, double slack) {
+  // Greatest sum of a row's absolute values: how much a matrix may enlarge a box.
+  static double box_growth(const Jacobian& matrix) {
+    double largest = 0;
     for (int a = 0; a < E::dim; ++a) {
-      double low = part(0, E::dim + a), high = low;
-      for (int c = 1; c < num_corners; ++c) {
-        low = std::min(low, part(c, E::dim + a));
-        high = std::max(high, part(c, E::dim + a));
+      double sum = 0;
+      for (int k = 0; k < E::dim; ++k) sum += std::abs(matrix(a, k));
+      largest = std::max(largest, sum);
+    }
+    return largest;
+  }
+
+  // Whether a plane across an axis has the images of all corners on one side, and the position on the other.
+  static bool excludes(const std::array<Point, num_corners>& image, double slack) {
+    for (int a = 0; a < E::dim; ++a) {
+      double low = image[0][a], high = low;
+      for (const Point& corner : image) {
+        low = std::min(low, corner[a]);
+        high = std::max(high, corner[a]);
       }
       if (low > slack || high < -slack) return true;
     }
@@ -214,16 +295,19 @@ class InverseMap {
   }
 
   // The same for planes along the part's own mean edges, which fit it the better the smaller it is.
-  static bool excludes_along_edges(const Part& part, double slack) {
-    const Eigen::Matrix<double, num_corners, E::dim> images = part.template rightCols<E::dim>();
+  static bool excludes_along_edges(const std::array<Point, num_corners>& image, double slack) {
     Jacobian edges = Jacobian::Zero();
     for (int c = 0; c < num_corners; ++c)
       for (int a = 0; a < E::dim; ++a)
-        edges.col(a) += (c >> a & 1 ? 2.0 : -2.0) / num_corners * images.row(c).transpose();
+        for (int k = 0; k < E::dim; ++k) edges(k, a) += (c >> a & 1 ? 2.0 : -2.0) / num_corners * image[c][k];
     const Jacobian inverse = edges.inverse();
-    Part own = part;
-    own.template rightCols<E::dim>() = images * inverse.transpose();
-    return own.allFinite() && excludes(own, slack * inverse.cwiseAbs().rowwise().sum().maxCoeff());
+    std::array<Point, num_corners> own;
+    bool finite = true;
+    for (int c = 0; c < num_corners; ++c) {
+      own[c] = product(inverse, image[c]);
+      for (int k = 0; k < E::dim; ++k) finite &= std::isfinite(own[c][k]);
+    }
+    return finite && excludes(own, slack * box_growth(inverse));
   }
 
   // Halves the cell along one axis after the other, iterates from the middles of the parts, and drops parts that cannot
@@ -232,26 +316,32 @@ class InverseMap {
   InverseMapResult<E> search(const Point& target, InverseMapResult<E> best) const {
     constexpr int max_halvings = (CubeElement<E> ? 16 : 3) * E::dim, max_starts = 1000;
     // Beside rounding, what the tolerances of callers let a position be outside.
-    const double slack = hair + 1e-15 * inverse_.cwiseAbs().rowwise().sum().maxCoeff();
+    const double slack = hair + 1e-15 * box_growth(inverse_);
     const Part cell = whole(target);
-    if (CubeElement<E> && excludes(cell, slack)) return best;
+    if (CubeElement<E> && excludes(cell.image, slack)) return best;
     std::vector<Part> parts{cell}, halves;
     int num_starts = 0;
     for (int halving = 0; halving < max_halvings && !parts.empty(); ++halving) {
       const int axis = halving % E::dim;
       for (const Part& part : parts) {
-        if (CubeElement<E> && (excludes(part, slack) || (halving >= E::dim && excludes_along_edges(part, slack))))
+        if (CubeElement<E> &&
+            (excludes(part.image, slack) || (halving >= E::dim && excludes_along_edges(part.image, slack))))
           continue;
         // Most parts are dropped before all axes are halved: an iteration costs more than a halving.
         if (axis == E::dim - 1) {
-          const InverseMapResult<E> found =
-              newton(target, part.template leftCols<E::dim>().colwise().mean().transpose());
+          Point middle = Point::Zero();
+          for (const Point& corner : part.xi) middle += corner;
+          const InverseMapResult<E> found = newton(target, middle / num_corners);
           if (found.converged && (!best.converged || E::margin(found.xi) > E::margin(best.xi))) best = found;
           if (settles(best) || ++num_starts == max_starts) return best;
         }
         Part low = part, high = part;
-        for (int c = 0; c < num_corners; ++c)
-          (c >> axis & 1 ? low : high).row(c) = 0.5 * (part.row(c) + part.row(c ^ 1 << axis));
+        for (int c = 0; c < num_corners; ++c) {
+          Part& half = c >> axis & 1 ? low : high;
+          const int across = c ^ 1 << axis;
+          half.xi[c] = 0.5 * (part.xi[c] + part.xi[across]);
+          half.image[c] = 0.5 * (part.image[c] + part.image[across]);
+        }
         halves.push_back(low);
         halves.push_back(high);
       }

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "framework/cell_extent.hpp"
+#include "framework/cell_map.hpp"
 #include "framework/error.hpp"
 #include "framework/large_array.hpp"
 #include "framework/tangent_plane.hpp"
@@ -200,7 +201,7 @@ MeshReport inspect(const Mesh& mesh) {
       double lowest = std::numeric_limits<double>::infinity(), highest = -lowest, quality = 1;
       for (int i = 0; i < E::num_nodes; ++i) {
         const Eigen::Matrix<double, E::dim, E::dim> jacobian =
-            positions.transpose() * E::shape_gradient(reference.row(i).transpose());
+            cell_jacobian<E>(positions, reference.row(i).transpose());
         const double determinant = jacobian.determinant();
         lowest = std::min(lowest, determinant);
         highest = std::max(highest, determinant);
@@ -211,10 +212,8 @@ MeshReport inspect(const Mesh& mesh) {
       if (lowest < 0) report.inverted_cells.push_back(cell);
       if (lowest < 0 && highest > 0) report.folded_cells.push_back(cell);
       // Differences to the first node, so that an offset of the mesh does not blur a flat cell's determinant.
-      const NodeMatrix<E> edges_from_first = positions.rowwise() - positions.row(0);
-      const Eigen::Matrix<double, E::dim, E::dim> jacobian =
-          edges_from_first.transpose() * E::shape_gradient(E::center());
-      const double determinant = jacobian.determinant();
+      const NodeMatrix<E> edges_from_first = from_first_node<E>(positions);
+      const double determinant = cell_jacobian<E>(edges_from_first, E::center()).determinant();
       if (is_degenerate<E>(cell_extent<E>(edges_from_first), determinant)) report.degenerate_cells.push_back(cell);
       report.volume += std::abs(determinant) * E::reference_volume;
       report.min_quality = std::min(report.min_quality, quality);

@@ -205,7 +205,7 @@ TYPED_TEST_P(ElementContract, InverseMapReturnsToThePoint) {
     const NodeMatrix<E> cell = contract_cell<E>(random, 0.08);
     const InverseMap<E> map(cell);
     ASSERT_FALSE(map.degenerate());
-    const ReferencePoint<E> xi = contract_point<E>(random), position = cell.transpose() * E::shape(xi);
+    const ReferencePoint<E> xi = contract_point<E>(random), position = cell_position<E>(cell, xi);
     const InverseMapResult<E> result = map(position);
     ASSERT_TRUE(result.converged);
     EXPECT_LT((result.xi - xi).norm(), 1e-11);
@@ -226,8 +226,7 @@ TYPED_TEST_P(ElementContract, PhongReproducesQuadraticsFromExactGradients) {
   for (int i = 0; i < E::num_nodes; ++i) block.cells(0, i) = i;
   constexpr int num_points = 100;
   Points points(num_points, d);
-  for (int p = 0; p < num_points; ++p)
-    points.row(p) = (cell.transpose() * E::shape(contract_point<E>(random))).transpose();
+  for (int p = 0; p < num_points; ++p) points.row(p) = cell_position<E>(cell, contract_point<E>(random)).transpose();
 
   const Eigen::Matrix<double, d, d> any = Eigen::Matrix<double, d, d>::NullaryExpr([&] { return uniform(random); });
   const Eigen::Matrix<double, d, d> A = any + any.transpose();

@@ -89,7 +89,7 @@ TYPED_TEST(Locate, FindsThePointsOfGoodCellsAmongFlatAndFoldedOnes) {
     const NodeMatrix<E> nodes = node_positions(folded, block, c);
     const InverseMap<E> map(nodes);
     if (map.degenerate() || !map.one_signed()) continue;
-    for (int i = 0; i < 4; ++i) positions.push_back(nodes.transpose() * E::shape(test::random_inside<E>(random)));
+    for (int i = 0; i < 4; ++i) positions.push_back(cell_position<E>(nodes, test::random_inside<E>(random)));
   }
   ASSERT_FALSE(positions.empty());
   Points points(static_cast<Index>(positions.size()), E::dim);

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "framework/cell_map.hpp"
 #include "framework/mesh.hpp"
 
 namespace halfgrad::test {
@@ -143,7 +144,7 @@ inline Points random_points_inside(const Mesh& mesh, Index count, unsigned seed)
   Points points(count, mesh.gdim());
   for (Index p = 0; p < count; ++p)
     with_cell(mesh, cell_distribution(random), [&]<Element E>(const ElementBlock<E>& block, Eigen::Index row) {
-      points.row(p) = (node_positions(mesh, block, row).transpose() * E::shape(random_inside<E>(random))).transpose();
+      points.row(p) = cell_position<E>(node_positions(mesh, block, row), random_inside<E>(random)).transpose();
     });
   return points;
 }
