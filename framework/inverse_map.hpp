@@ -127,11 +127,6 @@ class InverseMap {
     for (int a = 0; a < E::dim; ++a) xi[a] = std::clamp(xi[a], nodes.col(a).minCoeff(), nodes.col(a).maxCoeff());
     return xi;
   }
-  // Of a residual, against the size of what it is a residual of.
-  static bool is_small(const Point& residual, double bound, const Point& target) {
-    return residual.cwiseAbs().maxCoeff() <= bound * std::max(1.0, target.norm());
-  }
-
   // Whether the linear map from the first node takes the reference cell to the cell.
   bool is_image(const Jacobian& jacobian) const {
     const NodeMatrix<E> reference = E::nodes();
@@ -186,7 +181,8 @@ class InverseMap {
     from_first += product(inverse_, residual(from_first));
     // Where the inverse is worth nothing, on needles that are oblique to the axes, elimination with pivots is exact to
     // the rounding of the position.
-    if (!is_small(residual(from_first), 1e-14, target)) from_first = solve_by_elimination(jacobian, target);
+    if (!(residual(from_first).cwiseAbs().maxCoeff() <= 1e-14 * std::max(1.0, target.norm())))
+      from_first = solve_by_elimination(jacobian, target);
     const NodeMatrix<E> reference = E::nodes();
     for (int k = 0; k < E::dim; ++k) from_first[k] += reference(0, k);
     return {from_first, true};

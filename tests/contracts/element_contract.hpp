@@ -11,23 +11,9 @@
 
 #include "framework/cell_blocks.hpp"
 #include "framework/interpolant.hpp"
+#include "tests/support/random_inside.hpp"
 
 namespace halfgrad {
-
-/// ξ uniformly inside a reference cell.
-template <Element E>
-ReferencePoint<E> contract_point(std::mt19937& random) {
-  const NodeMatrix<E> nodes = E::nodes();
-  std::uniform_real_distribution<double> uniform(0, 1);
-  ReferencePoint<E> xi;
-  do {
-    for (int a = 0; a < E::dim; ++a) {
-      const double low = nodes.col(a).minCoeff(), high = nodes.col(a).maxCoeff();
-      xi[a] = low + (high - low) * uniform(random);
-    }
-  } while (!contains<E>(xi, 0));
-  return xi;
-}
 
 /// The reference cell with every node moved by up to `reach` times its box along each axis.
 template <Element E>
@@ -82,7 +68,7 @@ TYPED_TEST_P(ElementContract, ShapeIsOneAtItsNodeAndZeroAtOthers) {
 TYPED_TEST_P(ElementContract, WeightsSumToOneAndReproducePosition) {
   std::mt19937 random(1);
   for (int n = 0; n < 200; ++n) {
-    const auto xi = contract_point<TypeParam>(random);
+    const auto xi = test::random_inside<TypeParam>(random);
     EXPECT_NEAR(TypeParam::shape(xi).sum(), 1, 1e-14);
     EXPECT_LT(contract_difference(cell_position<TypeParam>(TypeParam::nodes(), xi), xi), 1e-14);
   }
@@ -92,7 +78,7 @@ TYPED_TEST_P(ElementContract, PolynomialsAreTheShapeFunctions) {
   if constexpr (MonomialElement<TypeParam>) {
     std::mt19937 random(4);
     for (int n = 0; n < 50; ++n) {
-      const auto xi = contract_point<TypeParam>(random);
+      const auto xi = test::random_inside<TypeParam>(random);
       Eigen::Matrix<double, num_variables<TypeParam>, 1> eta;
       eta.template head<TypeParam::dim>() = xi;
       if constexpr (RationalElement<TypeParam>) {
@@ -149,7 +135,7 @@ TYPED_TEST_P(ElementContract, CubeCollapsesOntoTheCell) {
 TYPED_TEST_P(ElementContract, GradientIsTheDerivativeOfShape) {
   std::mt19937 random(2);
   for (int n = 0; n < 50; ++n) {
-    const auto xi = contract_point<TypeParam>(random);
+    const auto xi = test::random_inside<TypeParam>(random);
     const NodeMatrix<TypeParam> gradient = TypeParam::shape_gradient(xi);
     for (int a = 0; a < TypeParam::dim; ++a) {
       constexpr double step = 1e-6;
@@ -229,7 +215,7 @@ TYPED_TEST_P(ElementContract, InverseMapReturnsToThePoint) {
     const NodeMatrix<E> cell = contract_cell<E>(random, 0.08);
     const InverseMap<E> map(cell);
     ASSERT_FALSE(map.degenerate());
-    const ReferencePoint<E> xi = contract_point<E>(random), position = cell_position<E>(cell, xi);
+    const ReferencePoint<E> xi = test::random_inside<E>(random), position = cell_position<E>(cell, xi);
     const InverseMapResult<E> result = map(position);
     ASSERT_TRUE(result.converged);
     EXPECT_LT(contract_difference(result.xi, xi), 1e-11);
@@ -248,7 +234,8 @@ TYPED_TEST_P(ElementContract, PhongReproducesQuadraticsFromExactGradients) {
   for (int i = 0; i < E::num_nodes; ++i) block.cells(0, i) = i;
   constexpr int num_points = 100;
   Points points(num_points, E::dim);
-  for (int p = 0; p < num_points; ++p) points.row(p) = cell_position<E>(cell, contract_point<E>(random)).transpose();
+  for (int p = 0; p < num_points; ++p)
+    points.row(p) = cell_position<E>(cell, test::random_inside<E>(random)).transpose();
 
   const ContractQuadratic field(E::dim, random);
   Values<double> values(E::num_nodes, 1), gradients(E::num_nodes, E::dim), out;

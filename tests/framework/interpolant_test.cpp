@@ -9,8 +9,8 @@
 #include <functional>
 #include <map>
 
-#include "framework/error.hpp"
 #include "reconstruction/cell_averages.hpp"
+#include "support/message_of.hpp"
 #include "support/test_meshes.hpp"
 
 namespace halfgrad {
@@ -406,36 +406,30 @@ TEST(Interpolant, RefusesWhatItCannotDo) {
   const Mesh mesh = test::lattice<Hexahedron>(2, 0, 1);
   const auto [points, embedding] = sampled<Hexahedron>(mesh, 2);
   const Reconstruction reconstruction = reconstruct(mesh, embedding);
-  const auto message = [](auto&& f) -> std::string {
-    try {
-      f();
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "no error";
-  };
   const Values<double> values = mesh.vertices();
-  EXPECT_THAT(message([&] { Interpolant<double>(mesh, embedding, named_rule("dual_taylor"), &reconstruction); }),
+  EXPECT_THAT(message_of([&] { Interpolant<double>(mesh, embedding, named_rule("dual_taylor"), &reconstruction); }),
               HasSubstr("Hessians"));
-  EXPECT_THAT(message([&] { Interpolant<double>(mesh, embedding, named_rule("quadratic10"), &reconstruction); }),
+  EXPECT_THAT(message_of([&] { Interpolant<double>(mesh, embedding, named_rule("quadratic10"), &reconstruction); }),
               HasSubstr("simplices"));
-  EXPECT_THAT(message([&] { named_rule("phnog"); }), HasSubstr("did you mean \"phong\""));
+  EXPECT_THAT(message_of([&] { named_rule("phnog"); }), HasSubstr("did you mean \"phong\""));
   const Interpolant<double> unbound(mesh, embedding, named_rule("phong"), nullptr);
-  EXPECT_THAT(message([&] { unbound.evaluate(values); }), HasSubstr("without a reconstructor"));
+  EXPECT_THAT(message_of([&] { unbound.evaluate(values); }), HasSubstr("without a reconstructor"));
   const Interpolant<double> bound(mesh, embedding, named_rule("phong"), &reconstruction);
   Values<double> out;
-  EXPECT_THAT(message([&] { bound.evaluate(Values<double>(values.topRows(5))); }), HasSubstr("values of 5 vertices"));
+  EXPECT_THAT(message_of([&] { bound.evaluate(Values<double>(values.topRows(5))); }),
+              HasSubstr("values of 5 vertices"));
   Reconstruction partial = reconstruction;
   partial = ChandrashekarGarg().reconstruct(CellGradients(mesh), std::vector<Index>{0, 1});
-  EXPECT_THAT(message([&] { Interpolant<double>(mesh, embedding, named_rule("phong"), &partial); }),
+  EXPECT_THAT(message_of([&] { Interpolant<double>(mesh, embedding, named_rule("phong"), &partial); }),
               HasSubstr("no gradient stencil for vertex"));
-  EXPECT_THAT(message([&] { bound.evaluate_given(values, Values<double>::Zero(3, 9), {}, out); }), HasSubstr("3 × 9"));
+  EXPECT_THAT(message_of([&] { bound.evaluate_given(values, Values<double>::Zero(3, 9), {}, out); }),
+              HasSubstr("3 × 9"));
   const Embedding flat = embed(test::lattice<Quadrilateral>(2, 0, 1), Points::Constant(1, 2, 0.3));
-  EXPECT_THAT(message([&] { Interpolant<double>(mesh, flat, named_rule("linear"), nullptr); }),
+  EXPECT_THAT(message_of([&] { Interpolant<double>(mesh, flat, named_rule("linear"), nullptr); }),
               HasSubstr("points embedded in 2 dimensions, but the mesh has 3"));
   const Reconstruction planar =
       ChandrashekarGarg().reconstruct(CellGradients(test::lattice<Quadrilateral>(2, 0, 1)), std::vector<Index>{0});
-  EXPECT_THAT(message([&] { Interpolant<double>(mesh, embedding, named_rule("phong"), &planar); }),
+  EXPECT_THAT(message_of([&] { Interpolant<double>(mesh, embedding, named_rule("phong"), &planar); }),
               HasSubstr("stencils of dimension 2 for a mesh of 3"));
 }
 

@@ -9,6 +9,7 @@
 
 #include "framework/cell_map.hpp"
 #include "framework/mesh.hpp"
+#include "tests/support/random_inside.hpp"
 
 namespace halfgrad::test {
 
@@ -120,21 +121,6 @@ inline Mesh stretched(const Mesh& mesh, double factor) {
   Points vertices = mesh.vertices();
   vertices.col(0) *= factor;
   return Mesh(std::move(vertices), mesh.blocks());
-}
-
-/// ξ uniformly inside the reference cell.
-template <Element E>
-ReferencePoint<E> random_inside(std::mt19937& random) {
-  const NodeMatrix<E> nodes = E::nodes();
-  std::uniform_real_distribution<double> uniform(0, 1);
-  ReferencePoint<E> xi;
-  do {
-    for (int a = 0; a < E::dim; ++a) {
-      const double low = nodes.col(a).minCoeff(), high = nodes.col(a).maxCoeff();
-      xi[a] = low + (high - low) * uniform(random);
-    }
-  } while (!contains<E>(xi, 0));
-  return xi;
 }
 
 /// Points uniform in reference coordinates of uniformly chosen cells, count × gdim: inside the mesh by construction.
