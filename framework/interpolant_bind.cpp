@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "framework/binding_order.hpp"
+#include "framework/cell_map.hpp"
 #include "framework/grid.hpp"
 #include "framework/interpolant_binding.hpp"
 #include "framework/large_array.hpp"
@@ -96,8 +97,7 @@ void pack_runs(const Mesh& mesh, const Embedding& embedding, const BindingOrder&
         for (int k = 0; k < d; ++k) runs.rest[r][i][k] = static_cast<Scalar>(positions(i, k) - positions(0, k));
       }
       if constexpr (PolynomialElement<E> && !E::affine)
-        runs.affine[r] =
-            has_affine_map<Scalar, E>(positions.rowwise() - positions.row(0), positions.cwiseAbs().maxCoeff());
+        runs.affine[r] = has_affine_map<Scalar, E>(from_first_node<E>(positions), positions.cwiseAbs().maxCoeff());
       const Index* points = order.points.data() + order.first_point[members[r]];
       for (Index p = runs.first[r]; p < runs.first[r + 1]; ++p, ++points) {
         __builtin_prefetch(embedding.local.data() + points[std::min<std::ptrdiff_t>(24, last_point - points)] * d);

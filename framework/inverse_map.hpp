@@ -127,6 +127,7 @@ class InverseMap {
     for (int a = 0; a < E::dim; ++a) xi[a] = std::clamp(xi[a], nodes.col(a).minCoeff(), nodes.col(a).maxCoeff());
     return xi;
   }
+
   // Whether the linear map from the first node takes the reference cell to the cell.
   bool is_image(const Jacobian& jacobian) const {
     const NodeMatrix<E> reference = E::nodes();
@@ -241,7 +242,7 @@ class InverseMap {
     return false;
   }
 
-  // A part of the cell by its corners, a row each: ξ, and J_c⁻¹ (x(ξ) − X).
+  // A part of the cell by its corners: ξ of each, and J_c⁻¹ (x(ξ) − X).
   static constexpr int num_corners = 1 << E::dim;
   struct Part {
     std::array<Point, num_corners> xi, image;
