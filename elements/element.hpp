@@ -97,9 +97,8 @@ concept PolynomialElement = MonomialElement<E> && !RationalElement<E>;
 /// An element that also states how its cell is a cube, collapsed where corners share a node: by this the inverse map
 /// proves that no ξ of a cell maps to a position, and elements without it are searched from a lattice of starts.
 ///
-/// cube_nodes           std::array of 2^dim nodes, that of corner c at u_k = bit k of c. With w_c(u) the multilinear
-/// weights
-///                      of the corners, ξ(u) = Σ_c w_c(u) node_cube_nodes[c] maps the unit cube onto the reference
+/// cube_nodes           std::array of 2^dim nodes, that of corner c at u_k = bit k of c. With the corners' multilinear
+///                      weights w_c(u), ξ(u) = Σ_c w_c(u) node_cube_nodes[c] maps the unit cube onto the reference
 ///                      cell, and β_i(ξ(u)) = Σ w_c(u) over the corners c that share node i
 template <class E>
 concept CubeElement = Element<E> && requires {
